@@ -6,6 +6,7 @@
 #include <complex>
 #include <cstdio>
 #include <cstdlib>
+#include <functional>
 #include <map>
 #include <memory>
 #include <string>
@@ -507,15 +508,19 @@ class PathTracer {
     const auto material = static_cast<std::int32_t>(scene_.materials.size()) - 1;
     const double area = kPi64 * static_cast<double>(settings.delta_radius) *
                         static_cast<double>(settings.delta_radius);
-    const auto stand_in = [&](Vec3 position, Rgb intensity, const SpotLight* spot) {
+    const auto stand_in = [&](const auto& light, const std::function<Color(Vec3)>& factor) {
       scene_.spheres.push_back(
-          {position, settings.delta_radius, false, {material, kNoAreaLight}, {}});
-      stand_ins_.push_back({Times(Working(FromFloat(intensity)), 1 / area), spot});
+          {light.position, settings.delta_radius, false, {material, kNoAreaLight}, {}});
+      stand_ins_.push_back({Times(Working(FromFloat(light.intensity)), 1 / area), factor});
     };
     for (const PointLight& light : scene.point_lights)
-      stand_in(light.position, light.intensity, nullptr);
+      stand_in(light, [](Vec3 /*leaving*/) { return Color{1, 1, 1}; });
     for (const SpotLight& light : scene.spot_lights)
-      stand_in(light.position, light.intensity, &light);
+      stand_in(light, [&light](Vec3 leaving) { return Falloff(light, leaving); });
+    for (const GoniometricLight& light : scene.goniometric_lights)
+      stand_in(light, [&light](Vec3 leaving) { return OnMap(light, leaving); });
+    for (const ProjectionLight& light : scene.projection_lights)
+      stand_in(light, [&light](Vec3 leaving) { return OnSlide(light, leaving); });
     const double sine = std::sin(static_cast<double>(settings.delta_angle_rad));
     cos_cone_ = std::sqrt(1 - sine * sine);
     for (const DistantLight& light : scene.distant_lights) {
@@ -552,7 +557,7 @@ class PathTracer {
  private:
   struct StandIn {
     Color radiance;
-    const SpotLight* spot;
+    std::function<Color(Vec3)> factor;  // in the direction that light leaves in, unit
   };
   struct Sun {
     Double3 towards;
@@ -585,34 +590,106 @@ class PathTracer {
     }
   }
 
-  // Of what the ray meets. Stand-ins that it passes add to `passed`.
-  bool Meet(Ray ray, bool sees_stand_ins, Color& passed, SurfacePoint& surface) const {
-    Hit hit;
-    while (intersector_->Intersect(ray, hit)) {
-      surface = intersector_->SurfaceAt(ray, hit);
-      if (hit.geometry != GeometryOf(scene_, ShapeKind::kSphere) ||
-          hit.primitive < first_stand_in_) {
-        return true;
+  enum class Met : std::uint8_t { kNothing, kSurface, kMedium };
+
+  // What the ray meets behind stand-ins and interfaces: a surface, or a medium that scatters it, at
+  // `point`. `weight` becomes that of what is there; stand-ins that the ray passes add to `seen`.
+  Met Meet(Ray ray, bool sees_stand_ins, PathNumbers& numbers, std::int32_t& medium, Color& weight,
+           Color& seen, SurfacePoint& point) const {
+    while (true) {
+      Hit hit;
+      const bool is_met = intersector_->Intersect(ray, hit);
+      if (medium != kNoMedium) {
+        double length = is_met ? static_cast<double>(hit.t) : HUGE_VAL;
+        if (IsScattered(scene_.media[static_cast<std::size_t>(medium)], numbers, length, weight)) {
+          point.position = ray.origin + ray.direction * static_cast<float>(length);
+          return Met::kMedium;
+        }
       }
-      const Vec3 wo = -ray.direction;
-      if (sees_stand_ins && Dot(surface.geometric_normal, wo) > 0) {
-        const StandIn& light = stand_ins_[hit.primitive - first_stand_in_];
-        AddTo(passed, Times(light.radiance, light.spot == nullptr ? 1 : Falloff(*light.spot, wo)));
+      if (!is_met) return Met::kNothing;
+      point = intersector_->SurfaceAt(ray, hit);
+      if (hit.geometry == GeometryOf(scene_, ShapeKind::kSphere) &&
+          hit.primitive >= first_stand_in_) {
+        const Vec3 wo = -ray.direction;
+        if (sees_stand_ins && Dot(point.geometric_normal, wo) > 0) {
+          const StandIn& light = stand_ins_[hit.primitive - first_stand_in_];
+          AddTo(seen, Times(weight, Times(light.radiance, light.factor(wo))));
+        }
+      } else if (scene_.materials[point.material].kind == Material::Kind::kInterface) {
+        medium = Beyond(point, ray.direction, medium);
+      } else {
+        return Met::kSurface;
       }
-      ray.origin = LeavingPoint(surface, ray.direction);
+      ray.origin = LeavingPoint(point, ray.direction);
     }
-    return false;
+  }
+
+  // Whether a medium scatters light within `length`, which becomes the place; a distance is drawn
+  // by the extinction of one channel, and weighed by the mean density of all.
+  static bool IsScattered(const Medium& medium, PathNumbers& numbers, double& length,
+                          Color& weight) {
+    const Color extinction = FromFloat(medium.Extinction());
+    const auto channel = static_cast<std::size_t>(3 * numbers.Next());
+    const double drawn = -std::log(1 - numbers.Next()) / extinction[channel];
+    const bool is_scattered = drawn < length;
+    if (is_scattered) length = drawn;
+    Color kept{};
+    double density = 0;
+    for (std::size_t c = 0; c < 3; ++c) {
+      kept[c] = extinction[c] > 0 ? std::exp(-extinction[c] * length) : 1;
+      density += kept[c] * (is_scattered ? extinction[c] : 1) / 3;
+    }
+    if (is_scattered) kept = Times(kept, FromFloat(medium.scattering));
+    weight = density > 0 ? Times(weight, Times(kept, 1 / density)) : Color{};
+    return is_scattered;
+  }
+
+  // The medium of a path through a surface.
+  std::int32_t Beyond(const SurfacePoint& surface, Vec3 direction, std::int32_t before) const {
+    const ShapeTraits& traits = TraitsOf(scene_, surface);
+    if (traits.medium_inside == traits.medium_outside) return before;
+    return Dot(direction, surface.geometric_normal) > 0 ? traits.medium_outside
+                                                        : traits.medium_inside;
   }
 
   // pbrt's spot: a cubic step of the cosine.
-  static double Falloff(const SpotLight& spot, Vec3 leaving) {
+  static Color Falloff(const SpotLight& spot, Vec3 leaving) {
     const double cosine = Dot(Unit(Double3(leaving)), Unit(Double3(spot.direction)));
     const auto outer = static_cast<double>(spot.cos_total_width);
     const auto inner = static_cast<double>(spot.cos_falloff_start);
-    if (cosine >= inner) return 1;
-    if (cosine <= outer) return 0;
-    const double t = (cosine - outer) / (inner - outer);
-    return 3 * t * t - 2 * t * t * t;
+    const double t = std::clamp((cosine - outer) / (inner - outer), 0.0, 1.0);
+    const double step = cosine >= inner ? 1 : 3 * t * t - 2 * t * t * t;
+    return {step, step, step};
+  }
+
+  static Vec3 InAxes(const ShapeAxes& axes, Vec3 direction) {
+    return {Dot(direction, axes.x), Dot(direction, axes.y), Dot(direction, axes.z)};
+  }
+
+  // Of a pixel of a picture over [0, 1]².
+  static Color PixelAt(const Picture& picture, double x, double y) {
+    const auto texel = [](double place, int size) {
+      return std::clamp(static_cast<int>(place * size), 0, size - 1);
+    };
+    return FromFloat(picture.At(texel(x, picture.width), texel(y, picture.height)));
+  }
+
+  static Color OnMap(const GoniometricLight& light, Vec3 leaving) {
+    const Vec2 place = EqualAreaPlace(Normalize(InAxes(light.axes, leaving)));
+    const Color pixel =
+        PixelAt(*light.map, static_cast<double>(place.x), static_cast<double>(place.y));
+    const double gray = (pixel[0] + pixel[1] + pixel[2]) / 3;
+    return {gray, gray, gray};
+  }
+
+  // The slide at distance 1 before the light.
+  static Color OnSlide(const ProjectionLight& light, Vec3 leaving) {
+    const Double3 in_axes(InAxes(light.axes, leaving));
+    if (!(in_axes.z > 0)) return {};
+    const double x = (1 + in_axes.x / in_axes.z / static_cast<double>(light.half_width)) / 2;
+    const double y = (1 - in_axes.y / in_axes.z / static_cast<double>(light.half_height)) / 2;
+    if (!(x >= 0 && x < 1 && y >= 0 && y < 1)) return {};
+    return Working(PixelAt(*light.map, x, y));
   }
 
   // Whether the ray goes through the rectangle, from the side that sees light.
@@ -638,14 +715,9 @@ class PathTracer {
         AddTo(seen, scale);
         continue;
       }
-      const Vec3 on_map = {Dot(direction, light.axes.x), Dot(direction, light.axes.y),
-                           Dot(direction, light.axes.z)};
-      const Vec2 place = EqualAreaPlace(Normalize(on_map));
-      const auto texel = [](float coordinate, int size) {
-        return std::min(static_cast<int>(coordinate * static_cast<float>(size)), size - 1);
-      };
-      const Color pixel = FromFloat(
-          light.map->At(texel(place.x, light.map->width), texel(place.y, light.map->height)));
+      const Vec2 place = EqualAreaPlace(Normalize(InAxes(light.axes, direction)));
+      const Color pixel =
+          PixelAt(*light.map, static_cast<double>(place.x), static_cast<double>(place.y));
       AddTo(seen, Times(scale, Working(pixel)));
     }
     if (sees_stand_ins) {
@@ -747,6 +819,26 @@ class PathTracer {
     return true;
   }
 
+  // In world space. Below a surface `point` moves. False: absorbed.
+  bool ScatterAtSurface(Vec3 wo, PathNumbers& numbers, SurfacePoint& point,
+                        Scattered& scattered) const {
+    const Surface surface = SurfaceOf(scene_, point);
+    const Frame frame = ShadingFrame(point);
+    const std::array<double, 3> u = {numbers.Next(), numbers.Next(), numbers.Next()};
+    const Double3 wo_local = Unit(Double3(frame.ToLocal(wo)));
+    const bool is_scattered =
+        surface.kind == Material::Kind::kSubsurface
+            ? ScatterBelow(surface, wo_local, u, numbers, frame, point, scattered)
+            : Scatter(surface, wo_local, u, scattered);
+    if (!is_scattered) return false;
+    const Vec3 wi = frame.ToWorld(ToFloat(scattered.wi));
+    // What the shading normal calls reflection must be one for the geometry too.
+    const bool transmits = scattered.wi.z * wo_local.z < 0;
+    const bool crosses = Dot(wo, point.geometric_normal) * Dot(wi, point.geometric_normal) < 0;
+    scattered.wi = Double3(wi);
+    return transmits == crosses;
+  }
+
   Color Radiance(Ray ray, PathNumbers& numbers) const {
     Color seen{};
     Color weight = {1, 1, 1};
@@ -756,47 +848,50 @@ class PathTracer {
     bool only_smooth = true;
     bool gathered = false;
     int events_left = settings_.max_depth;
+    std::int32_t medium = scene_.camera.medium;
     for (int vertex = 0;; ++vertex) {
-      Color passed{};
       SurfacePoint point;
-      const bool met = Meet(ray, !only_smooth, passed, point);
-      AddTo(seen, Times(weight, passed));
-      if (!met) {
+      const Met met = Meet(ray, !only_smooth, numbers, medium, weight, seen, point);
+      if (met == Met::kNothing) {
         AddTo(seen, Times(weight, FromInfinity(ray.origin, ray.direction, !only_smooth)));
         return seen;
       }
       const Vec3 wo = -ray.direction;
-      if (point.area_light != kNoAreaLight) {
+      if (met == Met::kSurface && point.area_light != kNoAreaLight) {
         const AreaLight& light = scene_.area_lights[static_cast<std::size_t>(point.area_light)];
         if (light.two_sided || Dot(point.geometric_normal, wo) > 0) {
           AddTo(seen, Times(weight, Emitted(light, point)));
         }
       }
       if (events_left == 0) return seen;
-      Prepare(point, numbers);
-      const Surface surface = SurfaceOf(scene_, point);
-      // The event at the first gathering surface belongs to both ends of a path.
-      if (surface.gathers && !gathered) {
+      bool gathers = true;
+      if (met == Met::kSurface) {
+        Prepare(point, numbers);
+        gathers = SurfaceOf(scene_, point).gathers;
+      }
+      // The event where photons are first gathered belongs to both ends of a path.
+      if (gathers && !gathered) {
         gathered = true;
         events_left = settings_.max_depth;
       }
       --events_left;
 
-      const Frame frame = ShadingFrame(point);
       Scattered scattered;
-      const std::array<double, 3> u = {numbers.Next(), numbers.Next(), numbers.Next()};
-      const Vec3 wo_local = frame.ToLocal(wo);
-      if (surface.kind == Material::Kind::kSubsurface) {
-        if (!ScatterBelow(surface, Unit(Double3(wo_local)), u, numbers, frame, point, scattered))
-          return seen;
-      } else if (!Scatter(surface, Unit(Double3(wo_local)), u, scattered)) {
-        return seen;
+      if (met == Met::kMedium) {
+        const auto g = static_cast<double>(scene_.media[static_cast<std::size_t>(medium)].g);
+        const double u1 = numbers.Next();
+        const double u2 = numbers.Next();
+        scattered.wi = ScatteredByPhase(Unit(Double3(ray.direction)), g, u1, u2);
+        scattered.weight = {1, 1, 1};
+        ray.origin = point.position;
+      } else {
+        if (!ScatterAtSurface(wo, numbers, point, scattered)) return seen;
+        const Vec3 wi = ToFloat(scattered.wi);
+        const bool crosses = Dot(wo, point.geometric_normal) * Dot(wi, point.geometric_normal) < 0;
+        if (crosses) medium = Beyond(point, wi, medium);
+        ray.origin = LeavingPoint(point, wi);
       }
-      const Vec3 wi = frame.ToWorld(ToFloat(scattered.wi));
-      // What the shading normal calls reflection must be one for the geometry too.
-      const bool transmits = scattered.wi.z * static_cast<double>(wo_local.z) < 0;
-      const bool crosses = Dot(wo, point.geometric_normal) * Dot(wi, point.geometric_normal) < 0;
-      if (transmits != crosses) return seen;
+      ray.direction = Normalize(ToFloat(scattered.wi));
       weight = Times(weight, scattered.weight);
       compression *= scattered.index * scattered.index;
       only_smooth = only_smooth && scattered.is_delta;
@@ -806,7 +901,6 @@ class PathTracer {
         if (!(numbers.Next() < survival)) return seen;
         weight = Times(weight, 1 / survival);
       }
-      ray = {LeavingPoint(point, wi), Normalize(wi), HUGE_VALF};
     }
   }
 

@@ -5,7 +5,8 @@
 // written anew here; only the geometry (Intersector), the Scene value with its textures, and the
 // working space are shared with the estimator. The estimate is unbiased for the scene it is given,
 // except for point, spot and distant lights, which BSDF sampling cannot hit:
-//   point, spot   a sphere of radius r at the light with radiance I(direction) / (π r²): the same
+//   point, spot, goniometric, projection
+//                 a sphere of radius r at the light with radiance I(direction) / (π r²): the same
 //                 intensity in every direction, from a place up to r off.
 //   distant       a cone of directions of half angle a with radiance E / (π sin² a): the same
 //                 irradiance on every plane that the whole cone is in front of.

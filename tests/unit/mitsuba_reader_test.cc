@@ -676,6 +676,9 @@ TEST(MitsubaReaderTest, WhatIsWrongIsSaidInOneSentenceWithItsPlace) {
        "</shape>",
        "\"int_ior\" of <bsdf type=\"dielectric\"> is unknown"},
       {"<emitter type='sky'/>", "<emitter type=\"sky\"> is not supported"},
+      {"<shape type='sphere'><float name='radius' value='1'/><float name='radius' value='2'/>"
+       "</shape>",
+       "\"radius\" of <shape type=\"sphere\"> is given twice"},
       {"<bsdf type='diffuse' id='a'/><bsdf type='diffuse' id='a'/>", "the id \"a\" is given twice"},
       {"<bsdf type='twosided' id='a'><ref id='a'/></bsdf><shape type='sphere'><ref "
        "id='a'/></shape>",

@@ -849,6 +849,20 @@ TEST(PbrtParserTest, EveryUnknownDirectiveIsReported) {
   EXPECT_EQ(std::count(said.begin(), said.end(), '\n'), 3) << said;
 }
 
+// As pbrt-v4 has it.
+TEST(PbrtParserTest, OfAParameterThatComesTwiceTheLastCounts) {
+  const ParsedScene twice = ParseWorld(
+      "LightSource \"infinite\"\nShape \"sphere\" \"float radius\" 1 \"float radius\" 2");
+  EXPECT_EQ(
+      SaidOf(twice),
+      "s.pbrt:3:33: warning: parameter \"radius\" of Shape \"sphere\" is given twice; the last "
+      "one counts\n");
+  ASSERT_EQ(twice.scene.spheres.size(), 1U);
+  EXPECT_EQ(twice.scene.spheres[0].radius, 2);
+  EXPECT_EQ(SaidOfWorld("Shape \"sphere\" \"float radius\" 1 \"integer radius\" 2"),
+            "s.pbrt:2:33: error: parameter \"radius\" of Shape \"sphere\" is given twice\n");
+}
+
 TEST(PbrtParserTest, AByteOrderMarkIsSkipped) {
   EXPECT_EQ(ParsePbrt("\xEF\xBB\xBF"
                       "Camera \"perspective\" WorldBegin Include \"a.pbrt\"",

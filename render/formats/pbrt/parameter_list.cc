@@ -45,28 +45,37 @@ const std::vector<std::string_view>& KnownParameterTypes() {
 }
 
 ParameterList::ParameterList(std::string subject, SourceLocation location,
-                             std::vector<Parameter> parameters,
-                             const std::vector<Parameter>* defaults, Diagnostics& diagnostics)
+                             std::vector<Parameter> given, const std::vector<Parameter>* defaults,
+                             Diagnostics& diagnostics)
     : subject_(std::move(subject)),
       location_(location),
-      parameters_(std::move(parameters)),
-      was_read_(parameters_.size()),
       defaults_(defaults),
       diagnostics_(diagnostics) {
   // Sorted, because a hostile text can bring very many.
-  std::vector<std::size_t> order(parameters_.size());
+  std::vector<std::size_t> order(given.size());
   for (std::size_t i = 0; i < order.size(); ++i)
     order[i] = i;
-  std::stable_sort(order.begin(), order.end(), [this](std::size_t a, std::size_t b) {
-    return parameters_[a].name < parameters_[b].name;
-  });
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return given[a].name < given[b].name; });
+  std::vector<bool> is_left_out(given.size());
   for (std::size_t i = 1; i < order.size(); ++i) {
-    if (parameters_[order[i]].name == parameters_[order[i - 1]].name) {
-      diagnostics_.Error(parameters_[order[i]].location,
-                         Concat("parameter ", Quoted(parameters_[order[i]].name), " of ", subject_,
-                                " is given twice"));
+    const Parameter& before = given[order[i - 1]];
+    const Parameter& after = given[order[i]];
+    if (before.name != after.name) continue;
+    // pbrt takes the last one of a type, and refuses two types. Other formats take none.
+    const std::string twice = Concat("parameter ", Called(after), " is given twice");
+    if (before.type == after.type && after.called.empty()) {
+      diagnostics_.Warning(after.location, Concat(twice, "; the last one counts"));
+      is_left_out[order[i - 1]] = true;
+    } else {
+      diagnostics_.Error(after.location, twice);
+      is_left_out[order[i]] = true;
     }
   }
+  for (std::size_t i = 0; i < is_left_out.size(); ++i) {
+    if (!is_left_out[i]) parameters_.push_back(std::move(given[i]));
+  }
+  was_read_.resize(parameters_.size());
 }
 
 const Parameter* ParameterList::Find(std::string_view name) const {

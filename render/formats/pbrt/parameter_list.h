@@ -52,9 +52,9 @@ inline constexpr Range kZeroOrMore = {0, 3.4e38};
 class ParameterList {
  public:
   // `subject` is what messages call the thing, such as: Shape "sphere". A default (may be null;
-  // else outlives the list) gives way to a parameter of its name, and need not be read. A
-  // parameter that comes twice is an error.
-  ParameterList(std::string subject, SourceLocation location, std::vector<Parameter> parameters,
+  // else outlives the list) gives way to a parameter of its name, and need not be read. Of a
+  // parameter that comes twice with one type the last counts, with two types it is an error.
+  ParameterList(std::string subject, SourceLocation location, std::vector<Parameter> given,
                 const std::vector<Parameter>* defaults, Diagnostics& diagnostics);
 
   [[nodiscard]] bool Has(std::string_view name) const { return Find(name) != nullptr; }
