@@ -11,6 +11,7 @@
 #include "render/base/parallel.h"
 #include "render/base/status.h"
 #include "render/math/rng.h"
+#include "render/math/sobol.h"
 #include "render/math/warp.h"
 #include "render/transport/bsdf.h"
 #include "render/transport/media.h"
@@ -18,8 +19,13 @@
 namespace lucerna {
 namespace {
 
-// Strata of each of the two numbers that choose a facet, and of the angle at the base.
-constexpr int kFacets = 24;
+// Facets that are averaged over: their slopes, which the critical angle cuts somewhere, and
+// azimuths of each slope, turned by this share of the step between them against those of the last
+// one.
+constexpr int kSlopes = 96;
+constexpr int kFacetAzimuths = 12;
+constexpr float kGoldenRatio = 0.618034F;
+// Strata of the angle at the base.
 constexpr int kAngles = 32;
 // Where the coat is smooth, one number is all that is averaged over.
 constexpr int kSmoothAngles = 4096;
@@ -49,19 +55,23 @@ Vec3 DirectionAt(float cosine, float azimuth) {
   return {sine * std::cos(azimuth), sine * std::sin(azimuth), cosine};
 }
 
-// Averages over the facets that are seen from `w`: visit(m) for each.
+// Averages over the facets that are seen from `w`: visit(m, share of the average) for each. Few
+// facets are steep, but a smooth function of their slope is not smooth in the number that chooses
+// them: it has a root where that is 1, which is taken out.
 template <typename Visit>
 float MeanOverFacets(const Ggx& ggx, Vec3 w, const Visit& visit) {
   double sum = 0;
-  for (int i = 0; i < kFacets; ++i) {
-    for (int j = 0; j < kFacets; ++j) {
-      const float u1 = (static_cast<float>(i) + 0.5F) / kFacets;
-      const float u2 = (static_cast<float>(j) + 0.5F) / kFacets;
-      const Vec3 m = ggx.SampleVisible(w, u1, u2);
-      if (Dot(w, m) > 0) sum += static_cast<double>(visit(m));
+  for (int i = 0; i < kSlopes; ++i) {
+    const float root = (static_cast<float>(i) + 0.5F) / kSlopes;
+    const float share = 2 * root / (kSlopes * kFacetAzimuths);
+    const float turn = std::fmod(kGoldenRatio * static_cast<float>(i), 1.0F);
+    for (int j = 0; j < kFacetAzimuths; ++j) {
+      const float u2 = (static_cast<float>(j) + turn) / kFacetAzimuths;
+      const Vec3 m = ggx.SampleVisible(w, 1 - root * root, u2);
+      if (Dot(w, m) > 0) sum += static_cast<double>(share * visit(m, share));
     }
   }
-  return static_cast<float>(sum / (kFacets * kFacets));
+  return static_cast<float>(sum);
 }
 
 float SmoothEntering(float cosine, float ior, float thickness) {
@@ -72,7 +82,7 @@ float SmoothEntering(float cosine, float ior, float thickness) {
 
 float RoughEntering(const Ggx& ggx, Vec3 w, float ior, float thickness) {
   const float visible = ggx.G1(w);
-  return MeanOverFacets(ggx, w, [&](Vec3 m) {
+  return MeanOverFacets(ggx, w, [&](Vec3 m, float /*share*/) {
     const float cos_m = Dot(w, m);
     float cos_t = 0;
     const float reflected = FresnelDielectric(cos_m, ior, cos_t);
@@ -85,7 +95,7 @@ float RoughEntering(const Ggx& ggx, Vec3 w, float ior, float thickness) {
 // Of light that goes up from the base: the share that the coat's surface sends down to it.
 float RoughReturned(const Ggx& ggx, Vec3 w, float ior, float thickness) {
   const float visible = ggx.G1(w);
-  return Crossing(thickness, w.z) * MeanOverFacets(ggx, w, [&](Vec3 m) {
+  return Crossing(thickness, w.z) * MeanOverFacets(ggx, w, [&](Vec3 m, float /*share*/) {
            float cos_t = 0;
            const float reflected = FresnelDielectric(Dot(w, m), 1 / ior, cos_t);
            const Vec3 down = ReflectAt(w, m);
@@ -150,14 +160,14 @@ CoatTable MakeTable(const MaterialNumbers& material) {
   return table;
 }
 
-// One crossing of the coat's surface, at a facet drawn for `w`, w.z > 0 on the side that light
-// comes from; `index`: beyond over here. The shares of flux that go on, and their directions, each
-// on its side with z > 0; a share of 0 has no direction.
+// One crossing of the coat's surface, at the facet that two numbers draw for `w`, w.z > 0 on the
+// side that light comes from; `index`: beyond over here. The shares of flux that go on, and their
+// directions, each on its side with z > 0; a share of 0 has no direction.
 struct Crossed {
   float reflected = 0, transmitted = 0;
   Vec3 back, beyond;
 };
-Crossed CrossSurface(const MaterialNumbers& material, Vec3 w, float index, KeyedRng& rng) {
+Crossed CrossSurface(const MaterialNumbers& material, Vec3 w, float index, float u1, float u2) {
   Crossed crossed;
   float cos_t = 0;
   if (HasNoFacets(material)) {
@@ -168,8 +178,6 @@ Crossed CrossSurface(const MaterialNumbers& material, Vec3 w, float index, Keyed
     return crossed;
   }
   const Ggx ggx(material);
-  const float u1 = rng.Uniform();
-  const float u2 = rng.Uniform();
   const Vec3 m = ggx.SampleVisible(w, u1, u2);
   const float cos_m = Dot(w, m);
   if (!(cos_m > 0)) return crossed;
@@ -183,6 +191,12 @@ Crossed CrossSurface(const MaterialNumbers& material, Vec3 w, float index, Keyed
     crossed.transmitted = (1 - fresnel) * ggx.G2(w, crossed.beyond) / visible;
   }
   return crossed;
+}
+
+Crossed CrossSurface(const MaterialNumbers& material, Vec3 w, float index, KeyedRng& rng) {
+  if (HasNoFacets(material)) return CrossSurface(material, w, index, 0, 0);
+  const float u1 = rng.Uniform();
+  return CrossSurface(material, w, index, u1, rng.Uniform());
 }
 
 float CosineOf(int node) {
@@ -346,21 +360,46 @@ void AddScattering(const MaterialNumbers& material, CoatTable& table) {
 // [albedos] of shares by meetings with the metal.
 using WalkedShares = std::vector<std::array<double, CoatTable::kHits + 1>>;
 
-// Adds the shares of flux from `w` that leave coat and metal after 0, 1, 2, ... meetings with a
+// The numbers of one of the walks from a node. Those of the first way down, to the metal and out
+// are spread evenly over all walks.
+class WalkNumbers {
+ public:
+  WalkNumbers(int walk, int node)
+      : even_(OwenSobol(static_cast<std::uint64_t>(walk),
+                        CombineKeys(kKey, static_cast<std::uint64_t>(node)))),
+        rng_(CombineKeys(CombineKeys(kKey, static_cast<std::uint64_t>(node)),
+                         static_cast<std::uint64_t>(walk))) {}
+
+  float Next() { return next_ < even_.size() ? even_[next_++] : rng_.Uniform(); }
+  // For walks through a layer that scatters.
+  KeyedRng& rng() { return rng_; }
+
+ private:
+  static constexpr std::uint64_t kKey = 0x434f4154ULL;
+  SobolPoint even_;
+  std::size_t next_ = 0;
+  KeyedRng rng_;
+};
+
+// Adds the shares of flux at `cosine` that leave coat and metal after 0, 1, 2, ... meetings with a
 // metal that reflects all. Returns the events in a layer that scatters.
-int WalkOverMetal(const MaterialNumbers& material, Vec3 w, KeyedRng& rng, WalkedShares& shares) {
+int WalkOverMetal(const MaterialNumbers& material, float cosine, WalkNumbers numbers,
+                  WalkedShares& shares) {
   constexpr float kLeastWeight = 1e-4F;
   const bool is_base_smooth = material.base_alpha_u == 0 && material.base_alpha_v == 0;
   const Ggx metal(material.base_alpha_u, material.base_alpha_v);
-  Crossed crossed = CrossSurface(material, w, material.ior, rng);
+  const auto cross = [&](Vec3 w, float index) {
+    const float u1 = numbers.Next();
+    return CrossSurface(material, w, index, u1, numbers.Next());
+  };
+  Crossed crossed = cross(DirectionAt(cosine, 2 * kPi * numbers.Next()), material.ior);
   // `from`: where light comes from at the metal. False: nothing is reflected.
   const auto reflect = [&](Vec3 from, Vec3& up, float& factor) {
     factor = 1;
     up = {-from.x, -from.y, from.z};
     if (is_base_smooth) return true;
-    const float u1 = rng.Uniform();
-    const float u2 = rng.Uniform();
-    up = ReflectAt(from, metal.SampleVisible(from, u1, u2));
+    const float u1 = numbers.Next();
+    up = ReflectAt(from, metal.SampleVisible(from, u1, numbers.Next()));
     if (!(up.z > 0)) return false;
     factor = metal.G2(from, up) / metal.G1(from);
     return true;
@@ -369,7 +408,7 @@ int WalkOverMetal(const MaterialNumbers& material, Vec3 w, KeyedRng& rng, Walked
   float factor = 0;
   if (material.HasHaze()) {
     LayerWalk in_layer(material, {crossed.beyond.x, crossed.beyond.y, -crossed.beyond.z},
-                       static_cast<double>(crossed.transmitted), rng);
+                       static_cast<double>(crossed.transmitted), numbers.rng());
     for (int hit = 0;; ++hit) {
       const auto at = static_cast<std::size_t>(std::min(hit, CoatTable::kHits));
       const bool is_at_base = in_layer.ToBase([&](double left, const AlbedoWeights& albedos) {
@@ -390,7 +429,7 @@ int WalkOverMetal(const MaterialNumbers& material, Vec3 w, KeyedRng& rng, Walked
     weight *= factor;
     weight *= Crossing(material.thickness, up.z);
     // Seen from below, where light comes from is (-x, -y, z) of where it goes.
-    crossed = CrossSurface(material, {-up.x, -up.y, up.z}, 1 / material.ior, rng);
+    crossed = cross({-up.x, -up.y, up.z}, 1 / material.ior);
     shares[0][static_cast<std::size_t>(std::min(hit + 1, CoatTable::kHits))] +=
         static_cast<double>(weight * crossed.transmitted);
     weight *= crossed.reflected;
@@ -399,21 +438,21 @@ int WalkOverMetal(const MaterialNumbers& material, Vec3 w, KeyedRng& rng, Walked
   return 0;
 }
 
-// The mean of visit(direction outside, share of flux) over the directions in which light from `w`
-// leaves that has met a metal of these facets once, 0 where none does. The metal reflects all, and
-// so lets the coat's surface through.
+// The mean of visit(direction outside, share of flux, share of the mean) over the directions in
+// which light from `w` leaves that has met a metal of these facets once, 0 where none does. The
+// metal reflects all, and so lets the coat's surface through.
 template <typename Visit>
 float MeanOverReflected(const Material& material, Vec3 w, const Ggx& facets, const Visit& visit) {
   Vec3 inside;
   if (!CoatRefracted(material, w, inside)) return 0;
   const float visible = facets.G1(inside);
-  return MeanOverFacets(facets, inside, [&](Vec3 m) {
+  return MeanOverFacets(facets, inside, [&](Vec3 m, float share) {
     const Vec3 up = ReflectAt(inside, m);
     const float x = up.x * material.ior;
     const float y = up.y * material.ior;
     const float squared = 1 - x * x - y * y;
     if (!(up.z > 0) || !(squared > 0)) return 0.0F;
-    return visit(Vec3{x, y, std::sqrt(squared)}, facets.G2(inside, up) / visible);
+    return visit(Vec3{x, y, std::sqrt(squared)}, facets.G2(inside, up) / visible, share);
   });
 }
 
@@ -437,17 +476,16 @@ double MeanMetOnce(const Material& material, float cosine) {
   const Ggx facets = BaseFacets(material);
   double sum = 0;
   ForEachTurn(material, cosine, [&](Vec3 w) {
-    sum += static_cast<double>(CoatEntering(material, w) *
-                               MeanOverReflected(material, w, facets, [&](Vec3 out, float share) {
-                                 return CoatEntering(material, out) * share;
-                               }));
+    const float mean = MeanOverReflected(
+        material, w, facets,
+        [&](Vec3 out, float flux, float /*share*/) { return CoatEntering(material, out) * flux; });
+    sum += static_cast<double>(CoatEntering(material, w) * mean);
   });
   return sum / TurnsOf(material);
 }
 
 // Requires a material with a table for its coat alone, to which the rest is added.
 void AddResidual(const Material& material, CoatTable& table) {
-  KeyedRng rng(0x434f4154ULL);
   constexpr std::size_t kCosines = CoatTable::kCosines;
   const std::size_t albedos = material.HasHaze() ? CoatTable::kAlbedos : 1;
   std::vector<WalkedShares> walked(kCosines, WalkedShares(albedos));
@@ -456,10 +494,7 @@ void AddResidual(const Material& material, CoatTable& table) {
     int walks = 0;
     std::int64_t events = 0;
     for (; walks < kWalks && events < kEventsOfNode; ++walks) {
-      // Few walks may be all there are in a layer that scatters: their azimuths are drawn.
-      const float turn =
-          material.HasHaze() ? rng.Uniform() : (static_cast<float>(walks) + 0.5F) / kWalks;
-      events += WalkOverMetal(material, DirectionAt(CosineOf(i), 2 * kPi * turn), rng, here);
+      events += WalkOverMetal(material, CosineOf(i), WalkNumbers(walks, i), here);
     }
     for (auto& row : here) {
       for (double& share : row)
@@ -578,15 +613,16 @@ void AddAgain(const Material& material, CoatTable& table) {
   // [kCosines × kCosines] of the flux from one node, what leaves at each, but for the factors.
   std::vector<double> reflected(kCosines * kCosines);
   const Ggx facets = AgainFacets(material);
-  const double each = 1.0 / (kFacets * kFacets * TurnsOf(material));
+  const double of_turn = 1.0 / TurnsOf(material);
   for (std::size_t i = 1; i < kCosines; ++i) {
     double* to = &reflected[i * kCosines];
     ForEachTurn(material, CosineOf(static_cast<int>(i)), [&](Vec3 w) {
-      MeanOverReflected(material, w, facets, [&](Vec3 out, float share) {
+      MeanOverReflected(material, w, facets, [&](Vec3 out, float flux, float share) {
         const Node node = NodeAt(out.z);
-        to[node.below] += each * static_cast<double>(share * (1 - node.share));
-        to[node.below + 1] += each * static_cast<double>(share * node.share);
-        return share;
+        const double leaving = of_turn * static_cast<double>(flux * share);
+        to[node.below] += leaving * static_cast<double>(1 - node.share);
+        to[node.below + 1] += leaving * static_cast<double>(node.share);
+        return flux;
       });
     });
   }

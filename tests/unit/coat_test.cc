@@ -423,6 +423,24 @@ TEST(CoatedMetalTest, IsAboutWhatAWalkThroughItBrings) {
   }
 }
 
+// Where the metal reflects all, its colour has no part in it: what is left are errors of tables.
+TEST(CoatedMetalTest, OverAMetalThatReflectsAllTheFluxIsThatOfTheWalk) {
+  constexpr double kTables = 3e-3;
+  for (const float alpha : {0.1F, 0.18F, 0.3F, 0.5F}) {
+    for (const float base_alpha : {0.0F, 0.2F}) {
+      const Material material = CoatedMetal({0, 0, 0}, Gray(1), alpha, base_alpha, 0.01F);
+      for (const double angle : {0.0, 45.0, 60.0}) {
+        const WalkedMetal walked = WalkOverMetal(material, AtAngle(angle), 400000);
+        const WalkedMetal ours = OfBsdf(material, AtAngle(angle), 400000);
+        EXPECT_NEAR(ours.flux, walked.flux,
+                    4.5 * std::hypot(walked.standard_error, ours.standard_error) + kTables)
+            << alpha << " over " << base_alpha << ", " << angle << " degrees; errors "
+            << walked.standard_error << ", " << ours.standard_error;
+      }
+    }
+  }
+}
+
 // The flux alone: haze has no direction that the model knows.
 TEST(CoatedMetalTest, ItsHazeBringsWhatAWalkBrings) {
   const std::vector<Material> materials = {
