@@ -42,6 +42,9 @@ struct CoatTable {
   // if the metal reflected everything.
   // Of a layer that scatters also light that never met the metal.
   static constexpr int kHits = 24;
+  // By how much the coat's facets widen the metal's as light sees them that meets the metal once
+  // (BaseWidthSeen).
+  float widening = 0.5F;
   // Its shares after 0, 1, 2, ... meetings; the last: or more.
   using ByHits = std::array<float, kHits + 1>;
   // For one albedo, 0, or for kAlbedos of them.

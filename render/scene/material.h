@@ -271,10 +271,12 @@ inline constexpr float kMaxRoughness = 1e3F;
 // Of a metal under a coat, as light meets it that crosses the coat's surface twice: GGX widths of
 // the half vectors of directions that are refracted at the mean surface. A facet that is turned by
 // the angle t turns what crosses it by t·(1 - 1/ior), inside, to first order, and a half vector by
-// half of that; the squares of the widths add up.
-[[nodiscard]] inline float BaseWidthSeen(float base_alpha, float coat_alpha, float ior) {
+// half of that. Were the squares of widths to add up, `widening` would be a half; sums of slopes
+// with such long tails are wider in the middle (CoatTable::widening).
+[[nodiscard]] inline float BaseWidthSeen(float base_alpha, float coat_alpha, float ior,
+                                         float widening) {
   const float turned = (1 - 1 / ior) * coat_alpha;
-  return std::sqrt(base_alpha * base_alpha + 0.5F * turned * turned);
+  return std::sqrt(base_alpha * base_alpha + widening * turned * turned);
 }
 
 // What differs between kinds, each in a file of its own, material_NAME.cc:

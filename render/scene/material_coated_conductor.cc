@@ -10,8 +10,8 @@ namespace lucerna {
 MaterialProperties CoatedConductorKind::Properties(const MaterialNumbers& material) {
   const float coat_width = std::max(material.alpha_u, material.alpha_v);
   const float base_width =
-      std::max(BaseWidthSeen(material.base_alpha_u, material.alpha_u, material.ior),
-               BaseWidthSeen(material.base_alpha_v, material.alpha_v, material.ior));
+      std::max(BaseWidthSeen(material.base_alpha_u, material.alpha_u, material.ior, 0.5F),
+               BaseWidthSeen(material.base_alpha_v, material.alpha_v, material.ior, 0.5F));
   const bool is_coat_smooth = coat_width == 0;
   // Of either surface a texture may make places smooth, and so have the parts of another kind.
   const bool may_have_parts = material.may_be_smooth && material.parts == Parts::kAll;

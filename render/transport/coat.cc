@@ -34,6 +34,10 @@ constexpr int kAzimuths = 9;
 // Random walks for each cosine outside, of tables over metals.
 constexpr int kWalks = 4096;
 constexpr int kScalings = 8;
+// Of CoatTable::widening: walks that it is fitted to, and between which values.
+constexpr int kFittedWalks = 1024;
+constexpr double kLeastWidening = 0.05;
+constexpr double kMostWidening = 4;
 // Of facets by which light is thrown about as by a diffuse surface.
 constexpr float kWidestAgain = 2;
 // Of walks through a layer that scatters: events of one walk at most, and events after which no
@@ -361,14 +365,26 @@ void AddScattering(const MaterialNumbers& material, CoatTable& table) {
 using WalkedShares = std::vector<std::array<double, CoatTable::kHits + 1>>;
 
 // The numbers of one of the walks from a node. Those of the first way down, to the metal and out
-// are spread evenly over all walks.
+// are spread evenly over all walks: one Sobol' sequence, shifted for each node (Cranley & Patterson
+// 1976).
 class WalkNumbers {
  public:
   WalkNumbers(int walk, int node)
-      : even_(OwenSobol(static_cast<std::uint64_t>(walk),
-                        CombineKeys(kKey, static_cast<std::uint64_t>(node)))),
-        rng_(CombineKeys(CombineKeys(kKey, static_cast<std::uint64_t>(node)),
-                         static_cast<std::uint64_t>(walk))) {}
+      : rng_(CombineKeys(CombineKeys(kKey, static_cast<std::uint64_t>(node)),
+                         static_cast<std::uint64_t>(walk))) {
+    static const std::vector<SobolPoint> kPoints = [] {
+      std::vector<SobolPoint> points(kWalks);
+      for (std::size_t i = 0; i < points.size(); ++i)
+        points[i] = OwenSobol(i, kKey);
+      return points;
+    }();
+    even_ = kPoints[static_cast<std::size_t>(walk)];
+    KeyedRng shifts(CombineKeys(kKey, static_cast<std::uint64_t>(node)));
+    for (float& number : even_) {
+      number += shifts.Uniform();
+      if (number >= 1) number -= 1;
+    }
+  }
 
   float Next() { return next_ < even_.size() ? even_[next_++] : rng_.Uniform(); }
   // For walks through a layer that scatters.
@@ -376,10 +392,34 @@ class WalkNumbers {
 
  private:
   static constexpr std::uint64_t kKey = 0x434f4154ULL;
-  SobolPoint even_;
+  SobolPoint even_ = {};
   std::size_t next_ = 0;
   KeyedRng rng_;
 };
+
+// The flux of a walk at right angles that leaves coat and metal after the first meeting, without
+// the layer between them, and its direction.
+double MeetOnce(const MaterialNumbers& material, WalkNumbers& numbers, Vec3& out) {
+  const auto cross = [&](Vec3 w, float index) {
+    const float u1 = numbers.Next();
+    return CrossSurface(material, w, index, u1, numbers.Next());
+  };
+  const Crossed down = cross({0, 0, 1}, material.ior);
+  if (!(down.transmitted > 0)) return 0;
+  const Vec3 from = {-down.beyond.x, -down.beyond.y, down.beyond.z};
+  Vec3 up = {down.beyond.x, down.beyond.y, down.beyond.z};
+  float factor = 1;
+  if (material.base_alpha_u > 0 || material.base_alpha_v > 0) {
+    const Ggx metal(material.base_alpha_u, material.base_alpha_v);
+    const float u1 = numbers.Next();
+    up = ReflectAt(from, metal.SampleVisible(from, u1, numbers.Next()));
+    if (!(up.z > 0)) return 0;
+    factor = metal.G2(from, up) / metal.G1(from);
+  }
+  const Crossed leaving = cross({-up.x, -up.y, up.z}, 1 / material.ior);
+  out = leaving.beyond;
+  return static_cast<double>(down.transmitted * factor * leaving.transmitted);
+}
 
 // Adds the shares of flux at `cosine` that leave coat and metal after 0, 1, 2, ... meetings with a
 // metal that reflects all. Returns the events in a layer that scatters.
@@ -456,6 +496,68 @@ float MeanOverReflected(const Material& material, Vec3 w, const Ggx& facets, con
   });
 }
 
+// CoatTable::widening of light at right angles that has met the metal once: where the likelihood is
+// greatest of the half vectors that random walks have. Facets of widths w have slopes (x, y) with
+// density 1 / (π w_u w_v (1 + q)²), q = x²/w_u² + y²/w_v², and there the derivative of its
+// logarithm has the same mean over the walks as over what the lobe brings.
+float FittedWidening(const Material& material) {
+  struct Met {
+    double x2, y2;  // squares of slopes
+    double flux;
+  };
+  const auto met_with = [&](Vec3 out, double flux) {
+    Vec3 inside;
+    if (!(flux > 0) || !CoatRefracted(material, out, inside)) return Met{0, 0, 0};
+    const auto x = static_cast<double>(inside.x / (1 + inside.z));
+    const auto y = static_cast<double>(inside.y / (1 + inside.z));
+    return Met{x * x, y * y, flux};
+  };
+  std::vector<Met> walked;
+  walked.reserve(kFittedWalks);
+  for (int walk = 0; walk < kFittedWalks; ++walk) {
+    Vec3 out;
+    WalkNumbers numbers(walk, CoatTable::kCosines - 1);
+    const double flux = MeetOnce(material, numbers, out);
+    walked.push_back(met_with(out, flux));
+  }
+  const auto squared = [](float width) {
+    return static_cast<double>(width) * static_cast<double>(width);
+  };
+  const double turned_u = squared((1 - 1 / material.ior) * material.alpha_u);
+  const double turned_v = squared((1 - 1 / material.ior) * material.alpha_v);
+  const auto is_wider = [&](double widening) {
+    const double u2 = squared(material.base_alpha_u) + widening * turned_u;
+    const double v2 = squared(material.base_alpha_v) + widening * turned_v;
+    struct Mean {
+      double sum = 0, flux = 0;
+    };
+    const auto add = [&](const Met& met, double share, Mean& mean) {
+      const double slope = met.x2 * turned_u / (u2 * u2) + met.y2 * turned_v / (v2 * v2);
+      mean.sum += share * met.flux * slope / (1 + met.x2 / u2 + met.y2 / v2);
+      mean.flux += share * met.flux;
+    };
+    Mean of_walks;
+    for (const Met& met : walked)
+      add(met, 1, of_walks);
+    Mean of_lobe;
+    const Ggx facets(static_cast<float>(std::sqrt(u2)), static_cast<float>(std::sqrt(v2)));
+    MeanOverReflected(material, {0, 0, 1}, facets, [&](Vec3 out, float flux, float share) {
+      add(met_with(out, static_cast<double>(flux * CoatEntering(material, out))),
+          static_cast<double>(share), of_lobe);
+      return flux;
+    });
+    return of_walks.sum * of_lobe.flux > of_lobe.sum * of_walks.flux;
+  };
+  double low = kLeastWidening;
+  double high = kMostWidening;
+  constexpr int kHalvings = 10;
+  for (int i = 0; i < kHalvings; ++i) {
+    const double middle = (low + high) / 2;
+    (is_wider(middle) ? low : high) = middle;
+  }
+  return static_cast<float>((low + high) / 2);
+}
+
 // Azimuths over which directions at one cosine are averaged.
 int TurnsOf(const Material& material) {
   return material.alpha_u == material.alpha_v && material.base_alpha_u == material.base_alpha_v ? 1
@@ -468,6 +570,40 @@ void ForEachTurn(const Material& material, float cosine, const Visit& visit) {
   for (int turn = 0; turn < turns; ++turn)
     visit(DirectionAt(cosine,
                       2 * kPi * (static_cast<float>(turn) + 0.5F) / static_cast<float>(turns)));
+}
+
+// The node of a table of cosines below `cosine`, and the share of the next one.
+struct Node {
+  std::size_t below;
+  float share;
+};
+Node NodeAt(float cosine) {
+  constexpr int kLast = CoatTable::kCosines - 1;
+  const float node = std::sqrt(std::clamp(cosine, 0.0F, 1.0F)) * kLast;
+  const int below = std::min(static_cast<int>(node), kLast - 1);
+  return {static_cast<std::size_t>(below), node - static_cast<float>(below)};
+}
+
+// [kCosines × kCosines] of the flux from one node, what leaves at each after one meeting with a
+// metal of these facets that reflects all, and so lets the coat's surface through. Over azimuths an
+// average.
+std::vector<double> ReflectedBetweenNodes(const Material& material, const Ggx& facets) {
+  constexpr std::size_t kCosines = CoatTable::kCosines;
+  std::vector<double> reflected(kCosines * kCosines);
+  const double of_turn = 1.0 / TurnsOf(material);
+  for (std::size_t i = 1; i < kCosines; ++i) {
+    double* to = &reflected[i * kCosines];
+    ForEachTurn(material, CosineOf(static_cast<int>(i)), [&](Vec3 w) {
+      MeanOverReflected(material, w, facets, [&](Vec3 out, float flux, float share) {
+        const Node node = NodeAt(out.z);
+        const double leaving = of_turn * static_cast<double>(flux * share);
+        to[node.below] += leaving * static_cast<double>(1 - node.share);
+        to[node.below + 1] += leaving * static_cast<double>(node.share);
+        return flux;
+      });
+    });
+  }
+  return reflected;
 }
 
 // What the first term of transport/coat.h brings of the flux at `cosine`, of a metal that reflects
@@ -504,10 +640,22 @@ void AddResidual(const Material& material, CoatTable& table) {
   // Facets of the coat throw some of the light back that comes near the critical angle, which the
   // share that enters does not contain: the factor is scaled until the flux after one meeting is
   // that of the walk. Half of the error goes to each of its two occurrences.
+  // Where E is the same for all azimuths, sums over nodes are the averages over facets.
+  const bool has_nodes = table.rows == 1 && !table.entering.empty();
+  std::vector<double> reflected;
+  if (has_nodes) reflected = ReflectedBetweenNodes(material, BaseFacets(material));
+  const auto met_once = [&](int i) {
+    if (!has_nodes) return MeanMetOnce(material, CosineOf(i));
+    const auto node = static_cast<std::size_t>(i);
+    double sum = 0;
+    for (std::size_t j = 0; j < kCosines; ++j)
+      sum += reflected[node * kCosines + j] * static_cast<double>(table.entering[j]);
+    return static_cast<double>(table.entering[node]) * sum;
+  };
   for (int round = 0; round < kScalings && !table.entering.empty(); ++round) {
     std::vector<float> scaled = table.entering;
     for (int i = 1; i < CoatTable::kCosines; ++i) {
-      const double once = MeanMetOnce(material, CosineOf(i));
+      const double once = met_once(i);
       if (!(once > 0)) continue;
       const auto scale =
           static_cast<float>(std::sqrt(walked[static_cast<std::size_t>(i)][0][1] / once));
@@ -524,9 +672,8 @@ void AddResidual(const Material& material, CoatTable& table) {
       auto& here = walked[static_cast<std::size_t>(i)][row];
       // Only what it brings too little can be made up for. Under a smooth coat it is exact, but for
       // haze, and what the walks differ by is noise.
-      here[1] = HasNoFacets(material) && !material.HasHaze()
-                    ? 0
-                    : std::max(0.0, here[1] - MeanMetOnce(material, CosineOf(i)));
+      here[1] =
+          HasNoFacets(material) && !material.HasHaze() ? 0 : std::max(0.0, here[1] - met_once(i));
       double residual = 0;
       for (std::size_t hit = 0; hit < here.size(); ++hit) {
         residual += here[hit];
@@ -540,18 +687,6 @@ void AddResidual(const Material& material, CoatTable& table) {
     for (std::size_t hit = 0; hit < by_hits.size(); ++hit)
       shares[hit] = sum > 0 ? static_cast<float>(by_hits[hit] / sum) : 0.0F;
   }
-}
-
-// The node of a table of cosines below `cosine`, and the share of the next one.
-struct Node {
-  std::size_t below;
-  float share;
-};
-Node NodeAt(float cosine) {
-  constexpr int kLast = CoatTable::kCosines - 1;
-  const float node = std::sqrt(std::clamp(cosine, 0.0F, 1.0F)) * kLast;
-  const int below = std::min(static_cast<int>(node), kLast - 1);
-  return {static_cast<std::size_t>(below), node - static_cast<float>(below)};
 }
 
 // What is read from the table of a coat, or from the two between which it lies.
@@ -610,22 +745,7 @@ void AddAgain(const Material& material, CoatTable& table) {
   const CoatTable::ByHits& shares = table.by_hits[0];
   for (std::size_t hit = 2; hit < shares.size(); ++hit)
     table.meetings_again += static_cast<float>(hit - 1) * shares[hit];
-  // [kCosines × kCosines] of the flux from one node, what leaves at each, but for the factors.
-  std::vector<double> reflected(kCosines * kCosines);
-  const Ggx facets = AgainFacets(material);
-  const double of_turn = 1.0 / TurnsOf(material);
-  for (std::size_t i = 1; i < kCosines; ++i) {
-    double* to = &reflected[i * kCosines];
-    ForEachTurn(material, CosineOf(static_cast<int>(i)), [&](Vec3 w) {
-      MeanOverReflected(material, w, facets, [&](Vec3 out, float flux, float share) {
-        const Node node = NodeAt(out.z);
-        const double leaving = of_turn * static_cast<double>(flux * share);
-        to[node.below] += leaving * static_cast<double>(1 - node.share);
-        to[node.below + 1] += leaving * static_cast<double>(node.share);
-        return flux;
-      });
-    });
-  }
+  const std::vector<double> reflected = ReflectedBetweenNodes(material, AgainFacets(material));
   // Half of each error goes to each of the two occurrences of a factor.
   constexpr int kRounds = 64;
   std::vector<double> again(kCosines);
@@ -651,6 +771,7 @@ CoatTable MakeCoat(const Material& original) {
   if (original.kind == Material::Kind::kCoatedConductor) {
     Material material = original;
     material.coat = &table;
+    if (!HasNoFacets(material)) table.widening = FittedWidening(material);
     AddResidual(material, table);
     if (!material.HasHaze()) AddAgain(material, table);
   }
@@ -819,20 +940,26 @@ float CoatAgain(const Material& material, float cosine) {
                    [&](const CoatTable& table) { return AtCosine(table.again, 0, cosine); });
 }
 
+float CoatWidening(const Material& material) {
+  return ReadTable(material, [](const CoatTable& table) { return table.widening; });
+}
+
 float CoatMeetingsAgain(const Material& material) {
   return ReadTable(material, [](const CoatTable& table) { return table.meetings_again; });
 }
 
 Ggx BaseFacets(const Material& material) {
-  return {BaseWidthSeen(material.base_alpha_u, material.alpha_u, material.ior),
-          BaseWidthSeen(material.base_alpha_v, material.alpha_v, material.ior)};
+  const float widening = CoatWidening(material);
+  return {BaseWidthSeen(material.base_alpha_u, material.alpha_u, material.ior, widening),
+          BaseWidthSeen(material.base_alpha_v, material.alpha_v, material.ior, widening)};
 }
 
 Ggx AgainFacets(const Material& material) {
   // A meeting of the coat's surface from below turns light as one of a metal of its facets does.
   const float meetings = CoatMeetingsAgain(material);
+  const float widening = CoatWidening(material);
   const auto width = [&](float base, float coat) {
-    const float once = BaseWidthSeen(base, coat, material.ior);
+    const float once = BaseWidthSeen(base, coat, material.ior, widening);
     return std::min(std::sqrt(once * once + meetings * (base * base + coat * coat)), kWidestAgain);
   };
   return {width(material.base_alpha_u, material.alpha_u),
