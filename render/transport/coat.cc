@@ -34,8 +34,7 @@ constexpr int kAzimuths = 9;
 // Random walks for each cosine outside, of tables over metals.
 constexpr int kWalks = 4096;
 constexpr int kScalings = 8;
-// Of CoatTable::widening: walks that it is fitted to, and between which values.
-constexpr int kFittedWalks = 1024;
+// CoatTable::widening is looked for between these.
 constexpr double kLeastWidening = 0.05;
 constexpr double kMostWidening = 4;
 // Of facets by which light is thrown about as by a diffuse surface.
@@ -513,8 +512,8 @@ float FittedWidening(const Material& material) {
     return Met{x * x, y * y, flux};
   };
   std::vector<Met> walked;
-  walked.reserve(kFittedWalks);
-  for (int walk = 0; walk < kFittedWalks; ++walk) {
+  walked.reserve(kWalks);
+  for (int walk = 0; walk < kWalks; ++walk) {
     Vec3 out;
     WalkNumbers numbers(walk, CoatTable::kCosines - 1);
     const double flux = MeetOnce(material, numbers, out);

@@ -455,9 +455,9 @@ TEST(CoatedMetalTest, ANarrowCoatWidensAMirrorAsSumsOfTwoSlopesAreWider) {
       sum += middle / (middle + square);
     (sum < kSums / 2.0 ? low : high) = middle;
   }
-  // The fit has 1024 walks; each term has a deviation of 0.29 about its mean, and the mean changes
+  // The fit has 4096 walks; each term has a deviation of 0.29 about its mean, and the mean changes
   // by a sixth of a relative change of w².
-  const double deviation = 6 * 0.29 / std::sqrt(1024.0);
+  const double deviation = 6 * 0.29 / std::sqrt(4096.0);
   EXPECT_GT(low, 0.6);
   EXPECT_NEAR(static_cast<double>(CoatWidening(material)) / low, 1, 3 * deviation);
 }
