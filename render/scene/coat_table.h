@@ -1,9 +1,10 @@
 // What passes a dielectric coat, averaged over where it goes inside: computed once for a material
-// (transport/coat.h).
+// (transport/coat_tables.h), read by transport/coat.h.
 #pragma once
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -13,6 +14,21 @@ namespace lucerna {
 struct CoatTable {
   // Cosines of directions outside, (i / (kCosines - 1))².
   static constexpr int kCosines = 49;
+  [[nodiscard]] static float CosineOf(int node) {
+    const float place = static_cast<float>(node) / (kCosines - 1);
+    return place * place;
+  }
+  // The node below a cosine, and the share of the next one.
+  struct Place {
+    std::size_t below;
+    float share;
+  };
+  [[nodiscard]] static Place PlaceOf(float cosine) {
+    constexpr int kLast = kCosines - 1;
+    const float node = std::sqrt(std::clamp(cosine, 0.0F, 1.0F)) * kLast;
+    const int below = std::min(static_cast<int>(node), kLast - 1);
+    return {static_cast<std::size_t>(below), node - static_cast<float>(below)};
+  }
 
   // Azimuths of the rows, from 0 to a quarter of a turn; one row where all are alike.
   int rows = 1;
@@ -66,6 +82,11 @@ struct CoatFamily {
   Differing differing = Differing::kSurface;
   float least = 0, largest = 0;
   std::vector<CoatTable> tables;  // at least 2, evenly spaced from the least number
+
+  // The number of a width, and the width of a number. Nearly the width where facets are flat, and
+  // below 1 for all: a texture that is very rough in one place leaves the tables of others dense.
+  [[nodiscard]] static float SpacingOf(float width) { return width / (1 + width); }
+  [[nodiscard]] static float WidthAt(float spacing) { return spacing / (1 - spacing); }
 
   // The tables below and above a number, and the share of the second.
   struct Place {

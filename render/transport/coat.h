@@ -43,10 +43,6 @@
 
 namespace lucerna {
 
-// Gives coated materials their tables. Materials with equal coats share one. With a texture of
-// roughness, tables of several widths, between which FitCoat interpolates. Tables take up to 0.2 s
-// of processor time each; threads as in ThreadTeam, with the same tables for any number.
-void PrepareCoats(std::vector<Material>& materials, int threads = 1);
 // Of a prepared material whose widths a texture has changed: the tables that suit them. Does
 // nothing for other materials.
 void FitCoat(MaterialNumbers& material);
@@ -86,7 +82,9 @@ void FitCoat(MaterialNumbers& material);
 [[nodiscard]] Rgb CoatMeanResidual(const Material& material);
 [[nodiscard]] Rgb CoatShareOfHits(const Material& material, std::size_t hits);
 // The share of light that is left after crossing the layer once at `cosine` inside.
-[[nodiscard]] float CoatCrossing(const Material& material, float cosine);
+[[nodiscard]] float CoatCrossing(const MaterialNumbers& material, float cosine);
+// E of a smooth coat for a direction at `cosine` outside, of any coated material.
+[[nodiscard]] float SmoothCoatEntering(const MaterialNumbers& material, float cosine);
 // w, w.z > 0, as refracted at the mean surface, again away from it: away from the metal. False with
 // total reflection.
 [[nodiscard]] bool CoatRefracted(const Material& material, Vec3 w, Vec3& inside);

@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "render/math/color_space.h"
-#include "render/transport/coat.h"
+#include "render/transport/coat_tables.h"
 #include "render/transport/subsurface.h"
 
 namespace lucerna {

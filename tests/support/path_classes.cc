@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "render/math/rng.h"
-#include "render/transport/coat.h"
+#include "render/transport/coat_tables.h"
 #include "tests/support/test_scenes.h"
 
 namespace lucerna {

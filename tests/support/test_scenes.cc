@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "render/math/warp.h"
-#include "render/transport/coat.h"
+#include "render/transport/coat_tables.h"
 #include "render/transport/subsurface.h"
 #include "tests/support/local_render.h"
 

@@ -12,6 +12,7 @@
 #include "render/math/rng.h"
 #include "render/math/warp.h"
 #include "render/transport/coat.h"
+#include "render/transport/coat_tables.h"
 #include "tests/support/chi_square.h"
 #include "tests/support/test_scenes.h"
 

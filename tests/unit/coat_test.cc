@@ -11,6 +11,7 @@
 #include "render/math/rng.h"
 #include "render/math/warp.h"
 #include "render/transport/bsdf.h"
+#include "render/transport/coat_tables.h"
 #include "render/transport/media.h"
 #include "render/transport/microfacet.h"
 #include "tests/support/test_scenes.h"
