@@ -14,6 +14,7 @@
 #include "render/estimate/evidence.h"
 #include "render/estimate/hitpoint_block.h"
 #include "render/math/fixed_point.h"
+#include "render/scene/density_grid.h"
 #include "render/scene/medium.h"
 #include "render/transport/media.h"
 #include "worker/gather.h"
@@ -28,7 +29,8 @@ namespace lucerna {
 //
 //   Φ p(θ) T(t) K(d² / r(t)²) r² / r(t)²
 //
-// where p is the phase function, T the transmittance from the beginning, K the kernel's shape and r
+// where p is the phase function, T the transmittance from the beginning (of the column density up
+// to t), K the kernel's shape and r
 // the radius at the end, by whose square all sums are divided later. Photons carry the flux that
 // was scattered. Rows as in Gather, with zeros for the radius controller's evidence: radii of
 // segments follow a schedule (Knaus & Zwicker 2011, "Progressive Photon Mapping: A Probabilistic
@@ -50,7 +52,9 @@ std::vector<GatherPiece> GatherSegments(const HitpointBlock& block, const Radius
   const float quanta_per_luminance = 1 / Luminance(scale.watts_per_quantum);
   constexpr float kInnerArea = kInnerShare * kInnerShare;
 
-  const auto gather_row = [&](std::size_t segment_number, GatherPiece& piece) {
+  // `column_table` is for media of uneven density, made where a photon is found.
+  const auto gather_row = [&](std::size_t segment_number, ColumnTable& column_table,
+                              GatherPiece& piece) {
     const MediumSegment& segment = block.segments[segment_number];
     const std::size_t row = first_row + segment_number;
     const auto hitpoint = static_cast<std::uint32_t>(row);
@@ -61,6 +65,7 @@ std::vector<GatherPiece> GatherSegments(const HitpointBlock& block, const Radius
     const Vec3 direction = way / length;
     const PhotonTree::Cone cone = {block.positions[row], direction, length,
                                    segment.narrowing * radii[row], radii[row]};
+    bool has_table = false;
     std::uint32_t found = 0;
     std::int64_t sum_r = 0;
     std::int64_t sum_g = 0;
@@ -70,7 +75,13 @@ std::vector<GatherPiece> GatherSegments(const HitpointBlock& block, const Radius
         cone, [&](std::size_t i, const ScatteredPhoton& photon, float t, float t2, float radius) {
           const float cosine = Dot(photon.arrival, direction);
           const float widening = radii[row] / radius;
-          const Rgb flux = photon.flux * medium.Transmittance(t) *
+          if (medium.density != nullptr && !has_table) {
+            column_table.Make(*medium.density, cone.origin, direction, static_cast<double>(length));
+            has_table = true;
+          }
+          const float column =
+              has_table ? static_cast<float>(column_table.At(static_cast<double>(t))) : t;
+          const Rgb flux = photon.flux * medium.Transmittance(column) *
                            (PhaseHenyeyGreenstein(cosine, medium.g) * widening * widening);
           if (!scale.HasRoomFor(flux)) {
             ++piece.excess;
@@ -96,12 +107,13 @@ std::vector<GatherPiece> GatherSegments(const HitpointBlock& block, const Radius
   };
 
   team.For(pieces.size(), 1, [&](std::size_t begin, std::size_t end) {
+    ColumnTable column_table;
     for (std::size_t p = begin; p < end; ++p) {
       const std::size_t begin_of_piece = (first_piece + p) * kRowsPerPiece;
       const std::size_t first = std::max(first_row, begin_of_piece);
       const std::size_t last = std::min(end_row, begin_of_piece + kRowsPerPiece);
       for (std::size_t row = first; row < last && !stop.load(std::memory_order_relaxed); ++row)
-        gather_row(row - first_row, pieces[p]);
+        gather_row(row - first_row, column_table, pieces[p]);
     }
   });
   return pieces;

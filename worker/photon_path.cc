@@ -260,21 +260,22 @@ PhotonPathTracer::Flight PhotonPathTracer::Fly(Ray& ray, std::int32_t& medium, K
         const int channel = std::min(static_cast<int>(rng.Uniform() * 3), 2);
         const float u = rng.Uniform();
         const float of_channel = extinction[channel];
-        const float free_path = of_channel > 0 ? -std::log1p(-u) / of_channel : HUGE_VALF;
-        if (free_path < length) {
-          const Rgb transmittance = through.Transmittance(free_path);
+        const float free_column = of_channel > 0 ? -std::log1p(-u) / of_channel : HUGE_VALF;
+        const Medium::Way way = through.Travel(ray.origin, ray.direction, length, free_column);
+        const Rgb transmittance = through.Transmittance(way.column);
+        if (!way.is_through) {
+          // The density there is in both, what is scattered and what the place was drawn by.
           flight.end = Flight::End::kScattered;
           flight.factor *=
               through.scattering * transmittance * (1 / mean(extinction * transmittance));
-          flight.position = ray.origin + ray.direction * free_path;
-          flight.length += free_path;
+          flight.position = ray.origin + ray.direction * way.length;
+          flight.length += way.length;
           return flight;
         }
-        const Rgb transmittance = through.Transmittance(length);
         if (const float passed = mean(transmittance); passed > 0)
           flight.factor *= transmittance * (1 / passed);
       } else {
-        flight.factor *= through.Transmittance(length);
+        flight.factor *= media_.TransmittanceOf(medium, ray, length);
       }
     }
     if (!is_met) return flight;

@@ -7,6 +7,7 @@
 #include "absl/strings/str_format.h"
 
 #include "render/geometry/bend_radii.h"
+#include "render/scene/density_grid.h"
 #include "render/scene/measured_table.h"
 #include "render/scene/shape_lists.h"
 #include "render/scene/subsurface_table.h"
@@ -154,6 +155,9 @@ SceneMemory SceneMemoryOf(const Scene& scene, const RayNeeds& rays) {
     if (material.kind == Material::Kind::kSubsurface &&
         of_subsurface.emplace(material.ior, material.phase_g).second)
       memory.tables += SubsurfaceTable::kBytes;
+  }
+  for (const Medium& medium : scene.media) {
+    if (medium.density != nullptr) memory.textures += static_cast<double>(medium.density->bytes());
   }
   // A picture is in memory once, however many refer to it.
   std::set<const Picture*> pictures;

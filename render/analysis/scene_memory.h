@@ -18,7 +18,7 @@ namespace lucerna {
 struct SceneMemory {
   double files = 0;         // as they were uploaded, which a coordinator keeps; 0: not counted
   double shapes = 0;        // meshes, analytic shapes, instances, materials, lights
-  double textures = 0;      // pixels, also of environment maps
+  double textures = 0;      // pixels, also of environment maps; densities of media
   double tables = 0;        // of materials below whose surfaces light is scattered
   double acceleration = 0;  // Embree's trees, with the copies of positions that they refer to
   double instances = 0;     // of that, what stands for instances in the tree above

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cfloat>
 #include <cmath>
+#include <memory>
 
+#include "render/scene/density_grid.h"
 #include "render/scene/scaling.h"
 #include "render/scene/scene_extent.h"
 #include "render/scene/shape_lists.h"
@@ -100,6 +102,8 @@ Status ChooseUnit(Scene& scene) {
     medium.scattering *= static_cast<float>(scene.unit);
     medium.absorption_spectrum.factor *= static_cast<float>(scene.unit);
     medium.scattering_spectrum.factor *= static_cast<float>(scene.unit);
+    if (medium.density != nullptr)
+      medium.density = std::make_shared<const DensityGrid>(medium.density->ScaledBy(factor));
   }
   for (InfiniteLight& light : scene.infinite_lights) {
     if (!light.portal) continue;

@@ -371,8 +371,9 @@ bool EyePathTracer::FindThroughMedia(Ray& ray, Hit& hit, std::int32_t& medium, R
   const bool is_met = intersector_.Intersect(ray, hit);
   if (!parts_.media) return is_met;
   return media_.Follow(ray, is_met, hit, medium, rays,
-                       [&](const Ray& /*leg*/, float t, std::int32_t of_leg) {
-                         if (of_leg != kNoMedium) transmittance *= media_[of_leg].Transmittance(t);
+                       [&](const Ray& leg, float t, std::int32_t of_leg) {
+                         if (of_leg != kNoMedium)
+                           transmittance *= media_.TransmittanceOf(of_leg, leg, t);
                        });
 }
 
@@ -381,10 +382,12 @@ EyeSegment EyePathTracer::SegmentOf(const Ray& ray, float t, std::int32_t medium
   // What lies so many mean free paths away is not seen, and nothing lies far outside of the scene.
   constexpr float kMostFreePaths = 40;
   constexpr float kMostDiagonals = 8;
-  const Rgb extinction = media_[medium].Extinction();
+  const Medium& through = media_[medium];
+  const Rgb extinction = through.Extinction();
   const float least = std::min({extinction.r, extinction.g, extinction.b});
   float end = std::min(t, kMostDiagonals * intersector_.bounds().Diagonal());
-  if (least > 0) end = std::min(end, kMostFreePaths / least);
+  if (least > 0)
+    end = through.Travel(ray.origin, ray.direction, end, kMostFreePaths / least).length;
   const auto footprint_at = [&](float length) { return footprint_ + footprint_slope_ * length; };
   return {.from = ray.origin,
           .to = ray.origin + ray.direction * end,
@@ -712,7 +715,7 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
   float segment_strength = 0;  // sum over the segments so far
   const auto pass_leg = [&](const Ray& leg, float t, std::int32_t of_leg) {
     if (of_leg != kNoMedium) {
-      const Rgb transmittance = media_[of_leg].Transmittance(t);
+      const Rgb transmittance = media_.TransmittanceOf(of_leg, leg, t);
       if (media_[of_leg].Scatters()) {
         // One of them is drawn in proportion to about what it scatters, and stands for all.
         const float strength =

@@ -78,7 +78,9 @@ Rgb Media::Transmittance(const Ray& ray, std::int32_t medium, int& rays) const {
   if (!has_interfaces_) {
     ++rays;
     if (intersector_.Occluded(ray)) return {};
-    return medium == kNoMedium ? Gray(1) : (*this)[medium].Transmittance(ray.t_max * scale);
+    return medium == kNoMedium
+               ? Gray(1)
+               : TransmittanceOf(medium, {ray.origin, ray.direction / scale}, ray.t_max * scale);
   }
   Rgb transmittance = Gray(1);
   Ray rest = {ray.origin, ray.direction / scale, ray.t_max * scale};
@@ -86,9 +88,8 @@ Rgb Media::Transmittance(const Ray& ray, std::int32_t medium, int& rays) const {
     Hit hit;
     ++rays;
     const bool is_met = intersector_.Intersect(rest, hit);
-    if (medium != kNoMedium) {
-      transmittance *= (*this)[medium].Transmittance(is_met ? hit.t : rest.t_max);
-    }
+    if (medium != kNoMedium)
+      transmittance *= TransmittanceOf(medium, rest, is_met ? hit.t : rest.t_max);
     if (!is_met) return transmittance;
     const SurfacePoint surface = intersector_.SurfaceAt(rest, hit);
     if (!IsInterface(surface) || IsBlack(transmittance)) return {};

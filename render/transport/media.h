@@ -60,6 +60,11 @@ class Media {
   [[nodiscard]] bool Follow(Ray& ray, bool is_met, Hit& hit, std::int32_t& medium, int& rays,
                             const OnLeg& on_leg) const;
 
+  // What is left of light after `length` of the ray, all of it in one medium.
+  [[nodiscard]] Rgb TransmittanceOf(std::int32_t medium, const Ray& ray, float length) const {
+    const Medium& through = (*this)[medium];
+    return through.Transmittance(through.Column(ray.origin, ray.direction, length));
+  }
   // The share of light that passes along the ray, whose direction need not be unit, up to t_max;
   // black when a surface that is no interface is in the way. `rays` counts what was traced.
   [[nodiscard]] Rgb Transmittance(const Ray& ray, std::int32_t medium, int& rays) const;

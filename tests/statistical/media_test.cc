@@ -1,9 +1,16 @@
 // The light in media must be right: as strong as closed forms and quadratures say.
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <memory>
+#include <vector>
 
 #include "gtest/gtest.h"
 
+#include "render/math/rng.h"
+#include "render/math/transform.h"
 #include "render/math/warp.h"
+#include "render/scene/density_grid.h"
 #include "tests/support/local_render.h"
 #include "tests/support/measure.h"
 #include "tests/support/test_scenes.h"
@@ -54,6 +61,36 @@ TEST(MediaFurnaceTest, IsAsBrightAsAnEmptyOneWhereNothingIsAbsorbed) {
   }
 }
 
+// The same of a medium that is thick in some places and missing in others.
+TEST(MediaFurnaceTest, IsAsBrightWhereDensityVaries) {
+  Medium medium = GrayMedium(0, 0.8F, 0.4F);
+  std::vector<float> values;
+  KeyedRng rng(3);
+  for (int i = 0; i < 4 * 3 * 5; ++i)
+    values.push_back(std::max(0.0F, 3 * rng.Uniform() - 1));
+  medium.density = std::make_shared<const DensityGrid>(std::array<int, 3>{4, 3, 5},
+                                                       std::move(values), Vec3{-1.6F, -1.2F, -1.8F},
+                                                       Vec3{2.4F, 1.6F, 1.5F}, Transform());
+  const Scene scene = FilledFurnace(0.5F, medium);
+  ExpectMean(Measure(scene, TestSettings(scene, 60000, 0.4, 100), 4, kParts, "G"), 2, 2e-3);
+}
+
+// Absorption alone: each ray's column density, up to the wall.
+TEST(MediaFurnaceTest, IsDarkenedByTheColumnDensityOfEachRay) {
+  Medium medium = GrayMedium(0.35F, 0);
+  medium.density =
+      std::make_shared<const DensityGrid>(std::array<int, 3>{2, 1, 1}, std::vector<float>{1, 3},
+                                          Vec3{-9.5F, -99, -99}, Vec3{10.5F, 99, 99}, Transform());
+  Scene scene = FilledFurnace(0, medium);
+  SetCamera(scene, {0.5, 0, 0}, {1, 0, 0}, {0, 1, 0}, 0.5, 4);
+  scene.camera.medium = 0;
+  const Image image = RenderLocally(scene, TestSettings(scene, 100, 0.3, 5), 1);
+  // From 2 in the middle, at x = 0.5, by 0.2 a unit of length. Across, density falls by 1/99 a unit
+  // of 2, and rays stay within 0.01 of the axis.
+  const double column = 2 * (2 + 0.1 * 2);
+  EXPECT_NEAR(ChannelMean(image, "G"), std::exp(-0.35 * column), 1e-4);
+}
+
 // A black wall that shines with radiance 1, around a medium that absorbs and does not scatter:
 // exp(-σ d) along each ray; at the sphere's centre d is the radius.
 TEST(MediaFurnaceTest, IsDarkenedByAbsorptionAsBeersLawSays) {
@@ -64,9 +101,18 @@ TEST(MediaFurnaceTest, IsDarkenedByAbsorptionAsBeersLawSays) {
   EXPECT_NEAR(ChannelMean(image, "G"), std::exp(-0.7), 1e-5);
 }
 
+// A density that is the same across x.
+struct LinearDensity {
+  double at_0 = 1, per_x = 0;
+  [[nodiscard]] double At(double x) const { return at_0 + per_x * x; }
+  // Its mean between two places.
+  [[nodiscard]] double Mean(double from, double to) const { return (At(from) + At(to)) / 2; }
+};
+
 // A point light of intensity 1 in a large medium; black walls far away, a single scattering. Along
 // the camera's ray the in-scattered radiance is an integral over the distance.
-double SingleScattering(const Medium& medium, double offset, double length) {
+double SingleScattering(const Medium& medium, double offset, double length,
+                        const LinearDensity& density) {
   const double sigma_s = static_cast<double>(medium.scattering.g);
   const double sigma_t = sigma_s + static_cast<double>(medium.absorption.g);
   const auto g = static_cast<double>(medium.g);
@@ -80,13 +126,16 @@ double SingleScattering(const Medium& medium, double offset, double length) {
     // Light travels from (3, offset) to (t, 0) and on towards the camera at t = 0.
     const double cosine = -(t - 3) / d;
     const double phase = (1 - g * g) / (4 * kPi64 * std::pow(1 + g * g - 2 * g * cosine, 1.5));
-    sum += sigma_s * phase * std::exp(-sigma_t * (t + d)) / squared * length / kSteps;
+    const double column = density.Mean(0, t) * t + density.Mean(3, t) * d;
+    sum +=
+        sigma_s * density.At(t) * phase * std::exp(-sigma_t * column) / squared * length / kSteps;
   }
   return sum;
 }
 
 // The same as the kernel sees it: around the ray, weighed by Epanechnikov's kernel of this radius.
-double SmoothedSingleScattering(const Medium& medium, double offset, double length, double radius) {
+double SmoothedSingleScattering(const Medium& medium, double offset, double length, double radius,
+                                const LinearDensity& density) {
   constexpr int kRings = 12;
   constexpr int kSectors = 12;
   double sum = 0;
@@ -98,19 +147,29 @@ double SmoothedSingleScattering(const Medium& medium, double offset, double leng
       const double angle = 2 * kPi64 * (sector + 0.5) / kSectors;
       const double aside = radius * std::sqrt(share);
       const double there = std::hypot(offset + aside * std::cos(angle), aside * std::sin(angle));
-      sum += weight * SingleScattering(medium, there, length);
+      sum += weight * SingleScattering(medium, there, length, density);
       weights += weight;
     }
   }
   return sum / weights;
 }
 
-TEST(SingleScatteringTest, IsTheIntegralAlongTheRay) {
+class SingleScatteringTest : public testing::TestWithParam<LinearDensity> {};
+
+TEST_P(SingleScatteringTest, IsTheIntegralAlongTheRay) {
   constexpr double kOffset = 0.8;
   constexpr double kRadius = 0.8;  // of surfaces; segments have half of it
+  const LinearDensity density = GetParam();
   for (const float g : {0.0F, 0.5F, -0.5F}) {
     SCOPED_TRACE(g);
-    const Medium medium = GrayMedium(0.05F, 0.1F, g);
+    Medium medium = GrayMedium(0.05F, 0.1F, g);
+    if (density.per_x != 0) {
+      constexpr float kFar = 1e5F;
+      medium.density = std::make_shared<const DensityGrid>(
+          std::array<int, 3>{2, 1, 1},
+          std::vector<float>{static_cast<float>(density.At(0)), static_cast<float>(density.At(20))},
+          Vec3{-10, -kFar, -kFar}, Vec3{30, kFar, kFar}, Transform());
+    }
     Scene scene;
     scene.media = {medium};
     const std::int32_t black = AddMaterial(scene, DiffuseMaterial(0));
@@ -124,12 +183,18 @@ TEST(SingleScatteringTest, IsTheIntegralAlongTheRay) {
     // A very narrow view along x.
     SetCamera(scene, {0, 0, 0}, {1, 0, 0}, {0, 1, 0}, 0.5, 1);
     scene.camera.medium = 0;
-    RenderSettings settings = TestSettings(scene, 200000, kRadius, 1);
+    RenderSettings settings = TestSettings(scene, 400000, kRadius, 1);
     settings.alpha = 1;  // radii are held
     ExpectMean(Measure(scene, settings, 4, kParts, "G"),
-               SmoothedSingleScattering(medium, kOffset, 10, kRadius / 2));
+               SmoothedSingleScattering(medium, kOffset, 10, kRadius / 2, density));
   }
 }
+
+INSTANTIATE_TEST_SUITE_P(Densities, SingleScatteringTest,
+                         testing::Values(LinearDensity{}, LinearDensity{0.2, 0.3}),
+                         [](const auto& test) {
+                           return test.param.per_x == 0 ? "Even" : "Growing";
+                         });
 
 // A beam of light through a box of fog without borders of its own: light behind an interface, seen
 // through it, and a wall lit through it, as Beer's law says.

@@ -20,6 +20,7 @@
 #include "render/math/equal_area_square.h"
 #include "render/math/rng.h"
 #include "render/math/warp.h"
+#include "render/scene/density_grid.h"
 #include "render/scene/subsurface_table.h"
 #include "render/scene/texture.h"
 #include "render/transport/bump.h"
@@ -601,7 +602,9 @@ class PathTracer {
       const bool is_met = intersector_->Intersect(ray, hit);
       if (medium != kNoMedium) {
         double length = is_met ? static_cast<double>(hit.t) : HUGE_VAL;
-        if (IsScattered(scene_.media[static_cast<std::size_t>(medium)], numbers, length, weight)) {
+        const Medium& through = scene_.media[static_cast<std::size_t>(medium)];
+        if (through.density != nullptr ? IsScatteredUnevenly(through, ray, numbers, length, weight)
+                                       : IsScattered(through, numbers, length, weight)) {
           point.position = ray.origin + ray.direction * static_cast<float>(length);
           return Met::kMedium;
         }
@@ -642,6 +645,35 @@ class PathTracer {
     if (is_scattered) kept = Times(kept, FromFloat(medium.scattering));
     weight = density > 0 ? Times(weight, Times(kept, 1 / density)) : Color{};
     return is_scattered;
+  }
+
+  // The same by collisions at the greatest density, of which the share of the density that is there
+  // is real (null collisions: Woodcock et al. 1965). Nothing of how the renderer integrates a
+  // density is used.
+  static bool IsScatteredUnevenly(const Medium& medium, const Ray& ray, PathNumbers& numbers,
+                                  double& length, Color& weight) {
+    const Color extinction = FromFloat(medium.Extinction());
+    const double most = Largest(extinction) * static_cast<double>(medium.density->largest());
+    if (!(most > 0)) return false;
+    const double mean = (extinction[0] + extinction[1] + extinction[2]) / 3;
+    // Densities end somewhere, and rays may not.
+    const double end = std::min(length, 1e6);
+    double t = 0;
+    while (true) {
+      t -= std::log(1 - numbers.Next()) / most;
+      if (!(t < end)) return false;
+      const double density = medium.density->At(ray.origin + ray.direction * static_cast<float>(t));
+      const double share = mean * density / most;
+      const bool is_real = numbers.Next() < share;
+      for (std::size_t c = 0; c < 3; ++c) {
+        weight[c] *= is_real ? static_cast<double>(medium.scattering[static_cast<int>(c)]) / mean
+                             : (1 - extinction[c] * density / most) / (1 - share);
+      }
+      if (is_real) {
+        length = t;
+        return true;
+      }
+    }
   }
 
   // The medium of a path through a surface.

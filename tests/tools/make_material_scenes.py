@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Random rooms of all kinds of surfaces, for comparing the estimator with a path tracer.
 
-  tests/tools/make_material_scenes.py FOLDER FIRST LAST [--more]
+  tests/tools/make_material_scenes.py FOLDER FIRST LAST [--more [--uneven]]
 
 Writes room-N.pbrt for the numbers FIRST to LAST. The same call writes the same bytes. Walls and
 objects have random materials with random parameters, textures, mixes and bumps; light comes from
@@ -10,7 +10,8 @@ them. No light below surfaces: the path tracer knows it on planes alone.
 
 With --more the rooms have media (fog in the room, in a part of it, inside glass), one to three
 lights of all kinds, curves, hair, instances, subdivision surfaces, parts of spheres and meshes with
-normals; picture.pfm is written beside them, for lights with pictures.
+normals; picture.pfm is written beside them, for lights with pictures. With --uneven their media
+have random densities on grids, and everything else is the same.
 """
 import argparse
 import math
@@ -245,8 +246,10 @@ class RoomWithMore(Room):
     widest_coat = 0.04
     hazy_coats = 0
 
-    def __init__(self, number):
+    def __init__(self, number, is_uneven=False):
         super().__init__(number)
+        # For densities alone, so that everything else is the same with and without.
+        self.uneven = random.Random(number) if is_uneven else None
         # A medium fills the room; the other one is in parts of it.
         self.room_medium = ""
         # Where shapes that separate media overlapped, media would depend on the way through them.
@@ -260,10 +263,30 @@ class RoomWithMore(Room):
         if not absorbs_alone and self.random.random() < 0.3:
             scattering = "[.5 .5 .5]"
         absorption = self.random.choice(["[0 0 0]", self.colour(0, 0.8), self.colour(0, 0.1)])
-        self.write(f'MakeNamedMedium "{name}" "string type" ["homogeneous"] '
+        kind, ends = '"string type" ["homogeneous"]', ("", "")
+        if self.uneven is not None:
+            kind, ends = self.grid()
+        self.write(f'{ends[0]}MakeNamedMedium "{name}" {kind} '
                    f'"rgb sigma_a" {absorption} "rgb sigma_s" {scattering} '
-                   f'"float scale" [{density}] "float g" [{self.random.uniform(-0.5, 0.8):.2f}]')
+                   f'"float scale" [{density}] "float g" [{self.random.uniform(-0.5, 0.8):.2f}]'
+                   f'{ends[1]}')
         return name
+
+    def grid(self):
+        """Random densities in a turned box, which may be smaller than what it fills."""
+        size = [self.uneven.randint(1, 7) for _ in range(3)]
+        values = [0 if self.uneven.random() < 0.3 else self.uneven.expovariate(1)
+                  for _ in range(size[0] * size[1] * size[2])]
+        low, high = ([sign * self.uneven.uniform(0.7, 3) for _ in range(3)] for sign in (-1, 1))
+        turn = (f"AttributeBegin Translate 0 {self.uneven.uniform(0, 1):.2f} 0 "
+                f"Rotate {self.uneven.uniform(0, 360):.1f} {self.uneven.random():.2f} 1 .3\n")
+        is_in_world = any("WorldBegin" in line for line in self.lines)
+        text = '"string type" ["uniformgrid"] '
+        text += " ".join(f'"integer n{axis}" [{n}]' for axis, n in zip("xyz", size))
+        for corner, place in (("p0", low), ("p1", high)):
+            text += f' "point3 {corner}" [{" ".join(f"{c:.3f}" for c in place)}]'
+        text += f'\n"float density" [{" ".join(f"{v:.3g}" for v in values)}]\n'
+        return text, (turn, "\nAttributeEnd") if is_in_world else ("", "")
 
     def begin(self):
         """An object's attributes, with the medium around it."""
@@ -495,12 +518,13 @@ def main():
     parser.add_argument("first", type=int)
     parser.add_argument("last", type=int)
     parser.add_argument("--more", action="store_true")
+    parser.add_argument("--uneven", action="store_true")
     arguments = parser.parse_args()
     arguments.folder.mkdir(parents=True, exist_ok=True)
     if arguments.more:
         (arguments.folder / "picture.pfm").write_bytes(picture())
     for number in range(arguments.first, arguments.last + 1):
-        room = RoomWithMore(number) if arguments.more else Room(number)
+        room = RoomWithMore(number, arguments.uneven) if arguments.more else Room(number)
         (arguments.folder / f"room-{number}.pbrt").write_text(room.text())
 
 

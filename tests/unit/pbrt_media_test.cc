@@ -6,6 +6,7 @@
 #include "gtest/gtest.h"
 
 #include "render/formats/read_scene.h"
+#include "render/scene/density_grid.h"
 #include "render/wire/block_codec.h"
 #include "tests/support/pbrt_text.h"
 
@@ -78,14 +79,14 @@ TEST(PbrtMediaTest, KeepTheirOpticalThicknessInAnotherUnit) {
 
 TEST(PbrtMediaTest, WhatIsWrongIsSaid) {
   EXPECT_THAT(SaidOfWorld("MakeNamedMedium \"m\""), HasSubstr("needs \"string type\""));
-  for (const char* const grid : {"uniformgrid", "rgbgrid", "nanovdb", "cloud"}) {
+  for (const char* const grid : {"rgbgrid", "nanovdb", "cloud"}) {
     const std::string type = std::string("\"") + grid + "\"";
     EXPECT_THAT(SaidOfWorld("MakeNamedMedium \"m\" \"string type\" " + type),
-                AllOf(HasSubstr(type + ", which is not supported"),
-                      HasSubstr("use homogeneous with the mean density")));
+                AllOf(HasSubstr(type + ", which is not supported"), HasSubstr("uniformgrid here")));
   }
-  EXPECT_THAT(SaidOfWorld("MakeNamedMedium \"m\" \"string type\" \"smoke\""),
-              HasSubstr("\"smoke\", which is not supported; there is homogeneous"));
+  EXPECT_THAT(
+      SaidOfWorld("MakeNamedMedium \"m\" \"string type\" \"smoke\""),
+      HasSubstr("\"smoke\", which is not supported; there are homogeneous and uniformgrid"));
   EXPECT_THAT(SaidOfWorld("MediumInterface \"m\" \"\""), HasSubstr("there is no medium \"m\""));
   EXPECT_THAT(SaidOfWorld(std::string(kFog) + kFog), HasSubstr("is defined twice"));
   EXPECT_THAT(
@@ -104,6 +105,66 @@ TEST(PbrtMediaTest, WhatIsWrongIsSaid) {
   EXPECT_THAT(
       SaidOfWorld("MakeNamedMedium \"m\" \"string type\" \"homogeneous\" \"float g\" 0.995"),
       HasSubstr("g"));
+}
+
+// pbrt-v4's defaults: one point in the unit cube of the directive's space.
+TEST(PbrtMediaTest, DensitiesLieInTheSpaceOfTheirDirective) {
+  const Scene scene = ReadWorld(
+      "AttributeBegin Translate 10 0 0 Scale 2 2 2 MakeNamedMedium \"m\" \"string type\" "
+      "\"uniformgrid\" \"integer nx\" 2 \"integer nz\" 1 \"point3 p0\" [1 1 1] \"point3 p1\" [0 0 "
+      "0] "
+      "\"float density\" [0.5 4] \"rgb sigma_s\" [1 2 3] \"float scale\" 3 AttributeEnd "
+      "MediumInterface \"m\" \"\" Material \"interface\" Shape \"sphere\"");
+  ASSERT_EQ(scene.media.size(), 1U);
+  const Medium& medium = scene.media[0];
+  ASSERT_NE(medium.density, nullptr);
+  EXPECT_FLOAT_EQ(medium.scattering.b, 9);
+  EXPECT_FLOAT_EQ(medium.absorption.b, 3);
+  EXPECT_NEAR(medium.density->At({10.5F, 1, 1}), 0.5, 1e-6);
+  EXPECT_NEAR(medium.density->At({11.5F, 1, 1}), 4, 1e-6);
+  EXPECT_NEAR(medium.density->At({11, 1, 1}), 2.25, 1e-6);
+  EXPECT_EQ(medium.density->At({12.1F, 1, 1}), 0);
+  // Lengths are the world's: a column of world length at density.
+  EXPECT_NEAR(medium.Column({10.5F, 1, -5}, {0, 0, 1}, HUGE_VALF), 0.5 * 0.75 * 2, 1e-5);
+}
+
+TEST(PbrtMediaTest, DensitiesFollowTheUnitOfTheScene) {
+  const Scene scene = ReadWorld(
+      "Scale 1e15 1e15 1e15 MakeNamedMedium \"m\" \"string type\" \"uniformgrid\" "
+      "\"float density\" 2 MediumInterface \"m\" \"\" Material \"interface\" Shape \"sphere\"");
+  ASSERT_NE(scene.unit, 1);
+  const auto middle = static_cast<float>(0.5e15 / scene.unit);
+  EXPECT_NEAR(scene.media[0].density->At({middle, middle, middle}), 2, 1e-5);
+  EXPECT_NEAR(
+      static_cast<double>(scene.media[0].Column({-middle, middle, middle}, {1, 0, 0}, HUGE_VALF)) *
+          scene.unit / 1e15,
+      1.5, 1e-5);
+}
+
+TEST(PbrtMediaTest, WhatIsWrongInAGridIsSaid) {
+  const auto said = [](const std::string& rest) {
+    return SaidOfWorld("MakeNamedMedium \"m\" \"string type\" \"uniformgrid\" " + rest);
+  };
+  EXPECT_THAT(said(""), HasSubstr("needs \"float density\""));
+  EXPECT_THAT(said("\"float density\" [1 2 3] \"integer nx\" 2 \"integer ny\" 2"),
+              HasSubstr("has 3 values; nx * ny * nz is 4"));
+  EXPECT_THAT(said("\"float density\" [1 -2] \"integer nx\" 2"),
+              HasSubstr("has the negative value -2"));
+  EXPECT_THAT(said("\"float density\" 1 \"integer nx\" 0"), HasSubstr("nx"));
+  EXPECT_THAT(said("\"float density\" 1 \"integer nx\" 1000000 \"integer ny\" 1000000 "
+                   "\"integer nz\" 1000000"),
+              HasSubstr("nx * ny * nz is 1000000000000000000"));
+  EXPECT_THAT(said("\"float density\" 1 \"point3 p1\" [1 0 1]"), HasSubstr("flat"));
+  EXPECT_THAT(said("\"float density\" 0"), HasSubstr("0 everywhere"));
+  EXPECT_THAT(said("\"float density\" 1e30 \"float scale\" 1e30"), HasSubstr("too large"));
+  EXPECT_THAT(said("\"float density\" 1 \"rgb Le\" [1 1 1]"), HasSubstr("media do not emit light"));
+  EXPECT_THAT(said("\"float density\" 1 \"float temperature\" 900"),
+              HasSubstr("media do not emit light"));
+  EXPECT_EQ(said("\"float density\" 1 \"rgb Le\" [1 1 1] \"float Lescale\" 0").find("Le"),
+            std::string::npos);
+  EXPECT_THAT(SaidOfWorld("Scale 1 0 1 MakeNamedMedium \"m\" \"string type\" \"uniformgrid\" "
+                          "\"float density\" 1"),
+              HasSubstr("has no place"));
 }
 
 HitpointBlock BlockWithSegments() {

@@ -18,7 +18,7 @@ namespace lucerna {
 namespace {
 
 constexpr std::size_t kWidth = 128;
-constexpr std::size_t kPixels = kWidth * kWidth;
+constexpr std::size_t kPixelsScaled = kWidth * kWidth;
 constexpr std::uint64_t kPasses = 16;
 
 // Says of a pixel what its memory holds.
@@ -51,16 +51,16 @@ double Normal(KeyedRng& rng) {
 // Light of 1 in every pixel, which scatters by 0.1 a pass.
 struct Light {
   double scale = 1;
-  std::size_t tiles = kPixels;  // of 16 × 16 pixels, the first of which have light
+  std::size_t tiles = kPixelsScaled;  // of 16 × 16 pixels, the first of which have light
 };
 ImageSums SumsOf(const Light& light = {}) {
-  ImageSums sums(kPixels);
+  ImageSums sums(kPixelsScaled);
   ThreadTeam team(1);
   KeyedRng rng(17);
   for (PassRange round = RoundOf(0); round.first < kPasses; round = RoundOf(round.last)) {
-    SliceSums slice = EmptySlice(round, kPixels, 0);
+    SliceSums slice = EmptySlice(round, kPixelsScaled, 0);
     const PassWeights weights = WeightsOf(round);
-    for (std::size_t i = 0; i < kPixels; ++i) {
+    for (std::size_t i = 0; i < kPixelsScaled; ++i) {
       if (i / kWidth / 16 * (kWidth / 16) + i % kWidth / 16 >= light.tiles) continue;
       const double even = weights.even + 0.1 * std::sqrt(weights.even) * Normal(rng);
       const double odd = weights.odd + 0.1 * std::sqrt(weights.odd) * Normal(rng);
@@ -88,8 +88,8 @@ double ScaleOf(const ImageSums& sums, const OfPixels& pixels, double scale = 1) 
   const Asked controller;
   KeyedRng rng(18);
   PixelRadii::Numbers numbers;
-  numbers.radius.resize(kPixels);
-  for (std::size_t i = 0; i < kPixels; ++i) {
+  numbers.radius.resize(kPixelsScaled);
+  for (std::size_t i = 0; i < kPixelsScaled; ++i) {
     const double bias = i < pixels.first ? 0 : pixels.bias;
     const double even = scale * (bias + pixels.scatter * Normal(rng));
     const double odd = scale * (bias + pixels.scatter * Normal(rng));
@@ -147,7 +147,7 @@ TEST(RadiusScaleTest, CountsTheFactorsThatPassesHad) {
 // All bias is in a sixteenth of the pixels, one tile in height, whose square is 1.6 % of the light.
 // That it lies together says nothing of chance.
 TEST(RadiusScaleTest, IsSureOfBiasThatLiesTogether) {
-  constexpr std::size_t kFirst = kPixels / 16 * 15;
+  constexpr std::size_t kFirst = kPixelsScaled / 16 * 15;
   const double expected = LeastAt(kNoise, 0.2 * 0.2 / 16, 1);
   EXPECT_NEAR(ScaleOf(SumsOf(), {.bias = 0.2, .scatter = 0.01, .first = kFirst}), expected,
               0.014 * expected);
@@ -155,7 +155,7 @@ TEST(RadiusScaleTest, IsSureOfBiasThatLiesTogether) {
 
 // All bias is in a quarter of the pixels, whose own evidence holds their radii at 0.2 already.
 TEST(RadiusScaleTest, LeavesOutPixelsThatTheirOwnEvidenceHolds) {
-  constexpr std::size_t kFirst = kPixels / 4 * 3;
+  constexpr std::size_t kFirst = kPixelsScaled / 4 * 3;
   const ImageSums sums = SumsOf();
   const double alone = ScaleOf(sums, {.bias = 0.2, .first = kFirst});
   EXPECT_LT(alone, 0.5);
@@ -174,7 +174,7 @@ TEST(RadiusScaleTest, IsTheSameWhateverFactorScalesAllLight) {
 }
 
 TEST(RadiusScaleTest, IsOneWhereChanceIsNotKnown) {
-  EXPECT_EQ(ScaleOf(ImageSums(kPixels), {.bias = 0.05}), 1);
+  EXPECT_EQ(ScaleOf(ImageSums(kPixelsScaled), {.bias = 0.05}), 1);
   EXPECT_EQ(ScaleOf(SumsOf({.tiles = 7}), {.bias = 0.05}), 1);
   EXPECT_LT(ScaleOf(SumsOf({.tiles = 8}), {.bias = 0.05}), 0.8);
 }
@@ -184,7 +184,7 @@ TEST(RadiusScaleTest, IsOneWhereTheControllerScalesNothing) {
   settings.radius_controller = RadiusControllerKind::kPpm;
   const std::unique_ptr<RadiusController> ppm = MakeRadiusController(settings, 1);
   const ImageSums sums = SumsOf();
-  EXPECT_EQ(RadiusScale(sums, PixelRadii(kPixels, 1, *ppm), SampleNoise(sums), kWidth), 1);
+  EXPECT_EQ(RadiusScale(sums, PixelRadii(kPixelsScaled, 1, *ppm), SampleNoise(sums), kWidth), 1);
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 // What a scene takes is counted, each thing once, and edges are those that are found.
 #include "render/analysis/scene_memory.h"
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <vector>
@@ -9,6 +10,8 @@
 #include "gtest/gtest.h"
 
 #include "render/geometry/feature_edges.h"
+#include "render/math/transform.h"
+#include "render/scene/density_grid.h"
 #include "tests/support/measured_file.h"
 #include "tests/support/test_scenes.h"
 
@@ -75,6 +78,16 @@ TEST(SceneMemoryTest, CountsTablesOfSubsurface) {
   EXPECT_EQ(tables({}), 0);
   EXPECT_NEAR(tables({1.3F}), 110e3, 2e3);
   EXPECT_EQ(tables({1.3F, 1.4F, 1.3F}), 2 * tables({1.3F}));
+}
+
+TEST(SceneMemoryTest, CountsTheDensitiesOfMedia) {
+  Scene scene;
+  scene.media.resize(2);
+  const double without = SceneMemoryOf(scene, kRays).textures;
+  scene.media[1].density =
+      std::make_shared<const DensityGrid>(std::array<int, 3>{8, 8, 8}, std::vector<float>(512, 1),
+                                          Vec3{0, 0, 0}, Vec3{1, 1, 1}, Transform());
+  EXPECT_EQ(SceneMemoryOf(scene, kRays).textures - without, 10 * 10 * 10 * sizeof(float));
 }
 
 TEST(SceneMemoryTest, CountsTheEdgesThatAreFound) {

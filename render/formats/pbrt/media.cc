@@ -1,10 +1,19 @@
 #include "render/formats/pbrt/media.h"
 
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <memory>
 #include <optional>
+#include <span>
 #include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
 
 #include "render/base/text.h"
 #include "render/formats/pbrt/measured_media.h"
+#include "render/scene/density_grid.h"
 
 namespace lucerna {
 namespace {
@@ -13,26 +22,99 @@ namespace {
 // (FluxScale::HasRoomFor), and the image would be too dark.
 constexpr Range kMeanCosine = {-0.99, 0.99};
 
+// Emission of a medium, which may only be none: by a colour, and in grids by temperatures.
+void RefuseEmission(ParameterList& parameters, bool is_grid) {
+  constexpr std::array<std::string_view, 1> kFloats = {"float"};
+  const auto is_any = [&](std::string_view name) {
+    return std::ranges::any_of(parameters.Numbers(name, kFloats, 1),
+                               [](double number) { return number > 0; });
+  };
+  const std::optional<Rgb> emitted = parameters.FindEmission("Le");
+  const bool has_scale = parameters.Has("Lescale");
+  const bool is_scaled = is_any("Lescale");
+  if (emitted.has_value() && !IsBlack(*emitted) && (is_scaled || !has_scale))
+    parameters.Error("Le", "is not supported: media do not emit light here");
+  if (!is_grid) return;
+  if (is_any("temperature") && (is_scaled || !has_scale))
+    parameters.Error("temperature", "is not supported: media do not emit light here");
+  for (const char* const name : {"temperatureoffset", "temperaturescale", "temperaturecutoff"})
+    parameters.Ignore(name);
+}
+
+// nullptr after an error.
+std::shared_ptr<const DensityGrid> ReadDensity(ParameterList& parameters,
+                                               const Transform& to_world) {
+  constexpr std::array<std::string_view, 1> kFloats = {"float"};
+  constexpr std::array<const char*, 3> kCounts = {"nx", "ny", "nz"};
+  constexpr Range kCount = {1, 1 << 20};
+  std::array<int, 3> size = {1, 1, 1};
+  std::uint64_t points = 1;
+  for (std::size_t axis = 0; axis < size.size(); ++axis) {
+    const std::int64_t count = parameters.FindInteger(kCounts[axis], kCount).value_or(1);
+    size[axis] = static_cast<int>(count);
+    points *= static_cast<std::uint64_t>(count);
+  }
+  const Vec3 p0 = parameters.Point("p0", {0, 0, 0});
+  const Vec3 p1 = parameters.Point("p1", {1, 1, 1});
+  const std::span<const double> numbers = parameters.Numbers("density", kFloats, 1);
+  if (numbers.empty()) {
+    if (!parameters.Has("density")) parameters.Error("needs \"float density\"");
+    return nullptr;
+  }
+  if (numbers.size() != points) {
+    parameters.Error("density",
+                     Concat("has ", numbers.size(), " values; nx * ny * nz is ", points));
+    return nullptr;
+  }
+  std::vector<float> values;
+  values.reserve(numbers.size());
+  for (const double number : numbers) {
+    if (number < 0) {
+      parameters.Error("density", Concat("has the negative value ", number));
+      return nullptr;
+    }
+    values.push_back(static_cast<float>(number));
+  }
+  const Vec3 low = {std::min(p0.x, p1.x), std::min(p0.y, p1.y), std::min(p0.z, p1.z)};
+  const Vec3 high = {std::max(p0.x, p1.x), std::max(p0.y, p1.y), std::max(p0.z, p1.z)};
+  if (!(high.x > low.x && high.y > low.y && high.z > low.z)) {
+    parameters.Error("p1", "makes the box from p0 flat");
+    return nullptr;
+  }
+  const StatusOr<Transform> from_world = to_world.Inverse();
+  if (!from_world.ok()) {
+    parameters.Error("density", Concat("has no place: ", from_world.status().message()));
+    return nullptr;
+  }
+  return std::make_shared<const DensityGrid>(size, values, low, high, *from_world);
+}
+
 }  // namespace
 
-Medium ReadMedium(ParameterList& parameters) {
+Medium ReadMedium(ParameterList& parameters, const Transform& to_world) {
   Medium medium;
   const std::optional<std::string> type = parameters.FindString("type");
   if (!type.has_value()) {
     if (!parameters.Has("type")) parameters.Error("needs \"string type\"");
     return medium;
   }
-  if (*type == "uniformgrid" || *type == "rgbgrid" || *type == "nanovdb" || *type == "cloud") {
-    parameters.Error(
-        "type", Concat("is ", Quoted(*type),
-                       ", which is not supported: media have the same density everywhere here; "
-                       "use homogeneous with the mean density"));
+  if (*type == "rgbgrid" || *type == "nanovdb" || *type == "cloud") {
+    parameters.Error("type", Concat("is ", Quoted(*type),
+                                    ", which is not supported; media of uneven density are "
+                                    "uniformgrid here, with one density at each point"));
     return medium;
   }
-  if (*type != "homogeneous") {
-    parameters.Error(
-        "type", Concat("is ", Quoted(*type), ", which is not supported; there is homogeneous"));
+  if (*type != "homogeneous" && *type != "uniformgrid") {
+    parameters.Error("type", Concat("is ", Quoted(*type),
+                                    ", which is not supported; there are homogeneous and "
+                                    "uniformgrid"));
     return medium;
+  }
+  const bool is_grid = *type == "uniformgrid";
+  if (is_grid) {
+    medium.density = ReadDensity(parameters, to_world);
+    if (medium.density != nullptr && !(medium.density->largest() > 0))
+      parameters.Warning("density", "is 0 everywhere: the medium does nothing");
   }
   // As pbrt-v4: each 1 where it is not given.
   medium.absorption =
@@ -61,14 +143,11 @@ Medium ReadMedium(ParameterList& parameters) {
   medium.scattering *= scale;
   medium.absorption_spectrum.factor = scale;
   medium.scattering_spectrum.factor = scale;
-  if (!IsFinite(medium.Extinction())) parameters.Error("scale", "makes a coefficient too large");
+  const float densest = medium.density != nullptr ? medium.density->largest() : 1;
+  if (!IsFinite(medium.Extinction() * densest))
+    parameters.Error("scale", "makes a coefficient too large");
   medium.g = static_cast<float>(parameters.Float("g", 0, kMeanCosine));
-  if (const std::optional<Rgb> emitted = parameters.FindEmission("Le");
-      emitted.has_value() && !IsBlack(*emitted) &&
-      parameters.Float("Lescale", 1, kZeroOrMore) > 0) {
-    parameters.Error("Le", "is not supported: media do not emit light here");
-  }
-  parameters.Ignore("Lescale");
+  RefuseEmission(parameters, is_grid);
   parameters.WarnOfUnread();
   return medium;
 }

@@ -438,7 +438,7 @@ bool DirectiveReader::OnMakeNamedMedium(Arguments& arguments) {
   NamedMedium& named = MediumCalled(name, arguments.location());
   if (named.is_defined) arguments.Error(Concat("the medium ", Quoted(name), " is defined twice"));
   named.is_defined = true;
-  Medium medium = ReadMedium(list);
+  Medium medium = ReadMedium(list, graphics_.state().to_world.start);
   medium.name = name;
   scene_.media[static_cast<std::size_t>(named.index)] = std::move(medium);
   return true;
