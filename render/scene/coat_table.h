@@ -72,6 +72,10 @@ struct CoatTable {
   // again on average.
   std::vector<float> again;
   float meetings_again = 0;
+  // What a metal makes of the residual of each direction, [kCosines], of the same layers: the share
+  // that has met it once, the share of the rest that meets it once more each time, and the mean of
+  // (1 - c)³ over the cosines c of all meetings.
+  std::vector<float> met_once, goes_on, slant;
 };
 
 // The tables of a coated material with a texture of its roughness or thickness. They differ in one

@@ -28,8 +28,8 @@ Rgb MetalInCoat(const Material& material, float cosine) {
 }
 
 // The share of the residual that is left when the metal absorbs: a power of its reflectance for
-// each number of meetings.
-Rgb ResidualColor(const Material& material) {
+// each number of meetings. Of a layer that scatters, all directions together.
+Rgb HazeColor(const Material& material) {
   // Light that meets the metal again comes more slanted than what comes first.
   constexpr float kMeanCosine = 0.6F;
   const Rgb metal = MetalInCoat(material, kMeanCosine);
@@ -37,6 +37,18 @@ Rgb ResidualColor(const Material& material) {
   for (int i = CoatTable::kHits; i > 0; --i)
     sum = metal * (sum + CoatShareOfHits(material, static_cast<std::size_t>(i)));
   return sum + CoatShareOfHits(material, 0);
+}
+
+// The same for light from a direction at `cosine`.
+Rgb ResidualColor(const Material& material, float cosine) {
+  if (material.HasHaze()) return HazeColor(material);
+  const CoatMeetings meetings = CoatMeetingsOf(material, cosine);
+  const Rgb metal = MetalInCoat(material, meetings.cosine);
+  const auto of = [&](float reflectance) {
+    const float more = reflectance * (1 - meetings.goes_on) / (1 - meetings.goes_on * reflectance);
+    return reflectance * (meetings.once + (1 - meetings.once) * more);
+  };
+  return {of(metal.r), of(metal.g), of(metal.b)};
 }
 
 // A smooth coat over a smooth metal: the sum over all orders, all in one direction.
@@ -74,7 +86,7 @@ Lobes LobesOf(const Material& material, Vec3 up) {
     lobes.coat = std::max(kLeastShare, FresnelDielectric(up.z, material.ior, cos_t));
   }
   lobes.base = std::max(kLeastShare, metal * CoatEntering(material, up));
-  lobes.residual = MaxChannel(CoatResidual(material, up.z) * ResidualColor(material));
+  lobes.residual = MaxChannel(CoatResidual(material, up.z) * ResidualColor(material, up.z));
   const float sum = lobes.coat + lobes.base + lobes.residual;
   return {lobes.coat / sum, lobes.base / sum, lobes.residual / sum};
 }
@@ -130,16 +142,17 @@ Rgb EvaluateUp(const Material& material, Vec3 up, Vec3 wi) {
              CoatEntering(material, wi));
     if (!material.HasHaze()) {
       const Ggx again = AgainFacets(material);
-      below += ResidualColor(material) * (again.D(m) * again.G2(up_in, wi_in) * jacobian *
-                                          CoatAgain(material, up.z) * CoatAgain(material, wi.z));
+      const Rgb color = (ResidualColor(material, up.z) + ResidualColor(material, wi.z)) * 0.5F;
+      below += color * (again.D(m) * again.G2(up_in, wi_in) * jacobian * CoatAgain(material, up.z) *
+                        CoatAgain(material, wi.z));
     }
   }
   if (!material.HasHaze()) return Gray(coat) + InScene(material, below);
   const Rgb mean = CoatMeanResidual(material);
   const Rgb residual = CoatResidual(material, up.z) * CoatResidual(material, wi.z) * kInversePi;
   const auto of_mean = [](float product, float of) { return of > 0 ? product / of : 0.0F; };
-  below += ResidualColor(material) * Rgb{of_mean(residual.r, mean.r), of_mean(residual.g, mean.g),
-                                         of_mean(residual.b, mean.b)};
+  below += HazeColor(material) * Rgb{of_mean(residual.r, mean.r), of_mean(residual.g, mean.g),
+                                     of_mean(residual.b, mean.b)};
   return Gray(coat) + InScene(material, below);
 }
 

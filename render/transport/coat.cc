@@ -109,6 +109,14 @@ float CoatAgain(const Material& material, float cosine) {
                    [&](const CoatTable& table) { return AtCosine(table.again, 0, cosine); });
 }
 
+CoatMeetings CoatMeetingsOf(const Material& material, float cosine) {
+  const auto at = [&](std::vector<float> CoatTable::*column) {
+    return ReadTable(material,
+                     [&](const CoatTable& table) { return AtCosine(table.*column, 0, cosine); });
+  };
+  return {at(&CoatTable::met_once), at(&CoatTable::goes_on), 1 - std::cbrt(at(&CoatTable::slant))};
+}
+
 float CoatWidening(const Material& material) {
   return ReadTable(material, [](const CoatTable& table) { return table.widening; });
 }

@@ -205,9 +205,18 @@ void AddScattering(const MaterialNumbers& material, CoatTable& table) {
 // [albedos] of shares by meetings with the metal.
 using WalkedShares = std::vector<std::array<double, CoatTable::kHits + 1>>;
 
+// What light of a metal of medium reflectance weighs that has met it so often.
+constexpr double kMediumReflectance = 0.6;
+
+// The mean of (1 - c)³ over meetings.
+struct MeanSlant {
+  double sum = 0, meetings = 0;
+};
+
 // Adds the shares of flux at a node that leave coat and metal after 0, 1, 2, ... meetings. Returns
 // the events in a layer that scatters.
-int AddWalk(const MaterialNumbers& material, int walk, int node, WalkedShares& shares) {
+int AddWalk(const MaterialNumbers& material, int walk, int node, WalkedShares& shares,
+            MeanSlant& slant) {
   MetalWalk metal_walk(material, CoatTable::CosineOf(node), WalkNumbers(walk, node));
   const auto place = [](int meetings) {
     return static_cast<std::size_t>(std::min(meetings, CoatTable::kHits));
@@ -220,6 +229,10 @@ int AddWalk(const MaterialNumbers& material, int walk, int node, WalkedShares& s
   }
   metal_walk.Through(material.base_hits, [&](int meetings, double flux, Vec3 /*out*/) {
     shares[0][place(meetings)] += flux;
+    if (meetings < 2) return;
+    const double weight = flux * std::pow(kMediumReflectance, meetings);
+    slant.sum += weight * static_cast<double>(metal_walk.slant());
+    slant.meetings += weight * meetings;
   });
   return 0;
 }
@@ -354,17 +367,36 @@ double MeanMetOnce(const Material& material, float cosine) {
   return sum / TurnsOf(material);
 }
 
+// What a metal makes of the residual at a node: shares by meetings, of which those after the first
+// become a geometric series, equal to them at a medium reflectance.
+void AddMeetings(const std::array<double, CoatTable::kHits + 1>& shares, const MeanSlant& slant,
+                 std::size_t node, CoatTable& table) {
+  double more = 0;
+  double left = 0;  // of `more`, at a medium reflectance, once at least
+  double power = 1;
+  for (std::size_t hit = 2; hit < shares.size(); ++hit, power *= kMediumReflectance) {
+    more += shares[hit];
+    left += shares[hit] * power;
+  }
+  const double all = shares[1] + more;
+  const double share = more > 0 ? left / more : 1;
+  table.met_once[node] = all > 0 ? static_cast<float>(shares[1] / all) : 0.0F;
+  table.goes_on[node] = static_cast<float>((1 - share) / (1 - kMediumReflectance * share));
+  table.slant[node] = slant.meetings > 0 ? static_cast<float>(slant.sum / slant.meetings) : 0.0F;
+}
+
 // Requires a material with a table for its coat alone, to which the rest is added.
 void AddResidual(const Material& material, CoatTable& table) {
   constexpr std::size_t kCosines = CoatTable::kCosines;
   const std::size_t albedos = material.HasHaze() ? CoatTable::kAlbedos : 1;
   std::vector<WalkedShares> walked(kCosines, WalkedShares(albedos));
+  std::vector<MeanSlant> slants(kCosines);
   for (int i = 1; i < CoatTable::kCosines; ++i) {
     WalkedShares& here = walked[static_cast<std::size_t>(i)];
     int walks = 0;
     std::int64_t events = 0;
     for (; walks < kCoatWalks && events < kEventsOfNode; ++walks) {
-      events += AddWalk(material, walks, i, here);
+      events += AddWalk(material, walks, i, here, slants[static_cast<std::size_t>(i)]);
     }
     for (auto& row : here) {
       for (double& share : row)
@@ -415,6 +447,15 @@ void AddResidual(const Material& material, CoatTable& table) {
       }
       table.residual[row * kCosines + static_cast<std::size_t>(i)] = static_cast<float>(residual);
       sum += WeightOfNode(i) * residual;
+    }
+    if (!material.HasHaze()) {
+      for (std::vector<float>* const column : {&table.met_once, &table.goes_on, &table.slant})
+        column->resize(kCosines);
+      for (std::size_t node = 1; node < kCosines; ++node)
+        AddMeetings(walked[node][row], slants[node], node, table);
+      // No light falls in along the surface.
+      for (std::vector<float>* const column : {&table.met_once, &table.goes_on, &table.slant})
+        column->front() = (*column)[1];
     }
     table.mean_residual.push_back(static_cast<float>(sum));
     CoatTable::ByHits& shares = table.by_hits.emplace_back();

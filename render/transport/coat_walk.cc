@@ -97,11 +97,16 @@ Crossed MetalWalk::Cross(Vec3 w, float index) {
 bool MetalWalk::Reflect(Vec3 from, Vec3& up, float& factor) {
   factor = 1;
   up = {-from.x, -from.y, from.z};
-  if (material_.base_alpha_u == 0 && material_.base_alpha_v == 0) return true;
-  const float u1 = numbers_.Next();
-  up = ReflectAt(from, metal_.SampleVisible(from, u1, numbers_.Next()));
-  if (!(up.z > 0)) return false;
-  factor = metal_.G2(from, up) / metal_.G1(from);
+  Vec3 facet = {0, 0, 1};
+  if (material_.base_alpha_u > 0 || material_.base_alpha_v > 0) {
+    const float u1 = numbers_.Next();
+    facet = metal_.SampleVisible(from, u1, numbers_.Next());
+    up = ReflectAt(from, facet);
+    if (!(up.z > 0)) return false;
+    factor = metal_.G2(from, up) / metal_.G1(from);
+  }
+  const float off = 1 - std::clamp(Dot(from, facet), 0.0F, 1.0F);
+  slant_ += off * off * off;
   return true;
 }
 

@@ -162,6 +162,8 @@ class MetalWalk {
       down = crossed.back;
     }
   }
+  // The sum over the meetings so far of (1 - c)³, c the cosine at the facet.
+  [[nodiscard]] float slant() const { return slant_; }
   // Through one that scatters: visit(meetings, share of flux, weights). Returns the events.
   template <typename Visit>
   int ThroughHaze(const Visit& visit) {
@@ -189,6 +191,7 @@ class MetalWalk {
   WalkNumbers numbers_;
   Ggx metal_;
   Crossed first_;
+  float slant_ = 0;
 };
 
 }  // namespace lucerna

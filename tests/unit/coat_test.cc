@@ -481,6 +481,24 @@ TEST(CoatedMetalTest, OverAMetalThatReflectsAllTheFluxIsThatOfTheWalk) {
   }
 }
 
+// What is left after several meetings depends on where light comes from: along the surface it meets
+// the metal more often, and more slanted.
+TEST(CoatedMetalTest, OfAColouredMetalUnderASmoothCoatTheFluxIsThatOfTheWalk) {
+  constexpr double kMeetings = 5e-3;  // relative, of geometric series and of mean cosines
+  for (const float base_alpha : {0.1F, 0.17F, 0.4F}) {
+    // Copper in green.
+    const Material material = CoatedMetal(Gray(0.96F), Gray(2.57F), 0, base_alpha, 0);
+    for (const double angle : {0.0, 45.0, 60.0, 75.0}) {
+      const WalkedMetal walked = WalkOverMetal(material, AtAngle(angle), 400000);
+      const WalkedMetal ours = OfBsdf(material, AtAngle(angle), 400000);
+      EXPECT_NEAR(
+          ours.flux, walked.flux,
+          4.5 * std::hypot(walked.standard_error, ours.standard_error) + kMeetings * walked.flux)
+          << base_alpha << ", " << angle << " degrees";
+    }
+  }
+}
+
 // The flux alone: haze has no direction that the model knows.
 TEST(CoatedMetalTest, ItsHazeBringsWhatAWalkBrings) {
   const std::vector<Material> materials = {
