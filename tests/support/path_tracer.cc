@@ -603,8 +603,11 @@ class PathTracer {
       if (medium != kNoMedium) {
         double length = is_met ? static_cast<double>(hit.t) : HUGE_VAL;
         const Medium& through = scene_.media[static_cast<std::size_t>(medium)];
-        if (through.density != nullptr ? IsScatteredUnevenly(through, ray, numbers, length, weight)
-                                       : IsScattered(through, numbers, length, weight)) {
+        // From so far away next to nothing comes back to the scene.
+        const double farthest = 8 * static_cast<double>(intersector_->bounds().Diagonal());
+        if (through.density != nullptr
+                ? IsScatteredUnevenly(through, ray, farthest, numbers, length, weight)
+                : IsScattered(through, numbers, length, weight)) {
           point.position = ray.origin + ray.direction * static_cast<float>(length);
           return Met::kMedium;
         }
@@ -650,14 +653,13 @@ class PathTracer {
   // The same by collisions at the greatest density, of which the share of the density that is there
   // is real (null collisions: Woodcock et al. 1965). Nothing of how the renderer integrates a
   // density is used.
-  static bool IsScatteredUnevenly(const Medium& medium, const Ray& ray, PathNumbers& numbers,
-                                  double& length, Color& weight) {
+  static bool IsScatteredUnevenly(const Medium& medium, const Ray& ray, double farthest,
+                                  PathNumbers& numbers, double& length, Color& weight) {
     const Color extinction = FromFloat(medium.Extinction());
     const double most = Largest(extinction) * static_cast<double>(medium.density->largest());
     if (!(most > 0)) return false;
     const double mean = (extinction[0] + extinction[1] + extinction[2]) / 3;
-    // Densities end somewhere, and rays may not.
-    const double end = std::min(length, 1e6);
+    const double end = std::min(length, farthest);
     double t = 0;
     while (true) {
       t -= std::log(1 - numbers.Next()) / most;

@@ -46,7 +46,7 @@ std::shared_ptr<const DensityGrid> ReadDensity(ParameterList& parameters,
                                                const Transform& to_world) {
   constexpr std::array<std::string_view, 1> kFloats = {"float"};
   constexpr std::array<const char*, 3> kCounts = {"nx", "ny", "nz"};
-  constexpr Range kCount = {1, 1 << 20};
+  constexpr Range kCount = {1, 1'000'000};
   std::array<int, 3> size = {1, 1, 1};
   std::uint64_t points = 1;
   for (std::size_t axis = 0; axis < size.size(); ++axis) {
