@@ -16,6 +16,7 @@
 #include "render/geometry/feature_edges.h"
 #include "render/math/fixed_point.h"
 #include "worker/gather.h"
+#include "worker/gather_segments.h"
 #include "worker/photon_grid.h"
 #include "worker/photon_path.h"
 
@@ -109,11 +110,12 @@ Bounds RegionOf(const HitpointBlock& block, const RadiusColumn& radii, float rad
 Bounds MediaRegionOf(const HitpointBlock& block, const RadiusColumn& radii) {
   Bounds region;
   for (std::size_t i = 0; i < block.segments.size(); ++i) {
-    const std::size_t row = block.first_segment() + i;
-    const Vec3 reach = {radii[row], radii[row], radii[row]};
-    for (const Vec3 end : {block.positions[row], block.segments[i].end}) {
-      region.Add(end - reach);
-      region.Add(end + reach);
+    const float radius = radii[block.first_segment() + i];
+    const Vec3 around = {radius, radius, radius};
+    const PhotonTree::Cone& cone = SegmentReach(block, i, radius).cone;
+    for (const Vec3 end : {cone.origin, cone.origin + cone.direction * cone.length}) {
+      region.Add(end - around);
+      region.Add(end + around);
     }
   }
   return region;

@@ -14,6 +14,7 @@
 #include "render/estimate/evidence.h"
 #include "render/estimate/hitpoint_block.h"
 #include "render/math/fixed_point.h"
+#include "render/math/octahedral.h"
 #include "render/scene/density_grid.h"
 #include "render/scene/medium.h"
 #include "render/transport/media.h"
@@ -23,14 +24,48 @@
 
 namespace lucerna {
 
+// Where the photons of a segment are looked for, and how far below the border they lie.
+//
+// A medium often begins at a surface that the eye sees at a slant. There the kernel, a disc across
+// the segment, reaches beyond the segment's beginning on one side, and on the other one the border
+// is deeper than that. So the distance of a photon counts from the border, as if that were flat:
+// with distances from the disc through the segment's beginning a medium whose free path is short
+// beside the radius would be black.
+struct SegmentReach {
+  SegmentReach(const HitpointBlock& block, std::size_t number, float last_radius) {
+    const MediumSegment& segment = block.segments[number];
+    const std::size_t row = block.first_segment() + number;
+    from = block.positions[row];
+    border = DecodeOctahedral(block.normals_oct[row]);
+    const Vec3 way = segment.end - from;
+    const float length = Length(way);
+    if (!(length > 0)) return;
+    const Vec3 direction = way / length;
+    const float first_radius = segment.narrowing * last_radius;
+    // More slanted borders count as this one.
+    constexpr float kLeastFacing = 0.2F;
+    facing = std::clamp(-Dot(border, direction), kLeastFacing, 1.0F);
+    const float before = first_radius * std::sqrt(1 - facing * facing) / facing;
+    cone = {from - direction * before, direction, length + before, first_radius, last_radius};
+  }
+  // Along the segment's direction.
+  [[nodiscard]] float Depth(Vec3 photon) const {
+    return std::max(0.0F, Dot(from - photon, border) / facing);
+  }
+
+  Vec3 from, border;
+  float facing = 1;
+  PhotonTree::Cone cone;
+};
+
 // The beam radiance estimate (Jarosz, Zwicker & Jensen 2008) with radii that grow along the segment
-// as the width of a pixel does: a photon of flux Φ, scattered at distance t along the segment and d
-// from it, adds
+// as the width of a pixel does: a photon of flux Φ, scattered at distance t from the border and d
+// from the segment, adds
 //
 //   Φ p(θ) T(t) K(d² / r(t)²) r² / r(t)²
 //
-// where p is the phase function, T the transmittance from the beginning (of the column density up
-// to t), K the kernel's shape and r
+// where p is the phase function, T the transmittance from the border (of the column density up to
+// t), K the kernel's shape and r
 // the radius at the end, by whose square all sums are divided later. Photons carry the flux that
 // was scattered. Rows as in Gather, with zeros for the radius controller's evidence: radii of
 // segments follow a schedule (Knaus & Zwicker 2011, "Progressive Photon Mapping: A Probabilistic
@@ -59,46 +94,45 @@ std::vector<GatherPiece> GatherSegments(const HitpointBlock& block, const Radius
     const std::size_t row = first_row + segment_number;
     const auto hitpoint = static_cast<std::uint32_t>(row);
     const Medium& medium = media[segment.medium];
-    const Vec3 way = segment.end - block.positions[row];
-    const float length = Length(way);
-    if (!(length > 0)) return;
-    const Vec3 direction = way / length;
-    const PhotonTree::Cone cone = {block.positions[row], direction, length,
-                                   segment.narrowing * radii[row], radii[row]};
+    const SegmentReach reach(block, segment_number, radii[row]);
+    if (!(reach.cone.length > 0)) return;
+    const Vec3 direction = reach.cone.direction;
     bool has_table = false;
     std::uint32_t found = 0;
     std::int64_t sum_r = 0;
     std::int64_t sum_g = 0;
     std::int64_t sum_b = 0;
     std::int64_t blur = 0;
-    photons.ForEachWithin(
-        cone, [&](std::size_t i, const ScatteredPhoton& photon, float t, float t2, float radius) {
-          const float cosine = Dot(photon.arrival, direction);
-          const float widening = radii[row] / radius;
-          if (medium.density != nullptr && !has_table) {
-            column_table.Make(*medium.density, cone.origin, direction, static_cast<double>(length));
-            has_table = true;
-          }
-          const float column =
-              has_table ? static_cast<float>(column_table.At(static_cast<double>(t))) : t;
-          const Rgb flux = photon.flux * medium.Transmittance(column) *
-                           (PhaseHenyeyGreenstein(cosine, medium.g) * widening * widening);
-          if (!scale.HasRoomFor(flux)) {
-            ++piece.excess;
-            return;
-          }
-          MarkFound(found_by[i], hitpoint);
-          const float whole = GatherKernel::Shape(t2);
-          const float inner_t2 = t2 / kInnerArea;
-          const float inner = inner_t2 < 1 ? GatherKernel::Shape(inner_t2) / kInnerArea : 0;
-          const std::uint64_t bits = PairBits(photon.key, hitpoint);
-          const Rgb quanta = flux * scale.quanta_per_watt * whole;
-          sum_r += RoundDithered(quanta.r, DitherOf(bits, 0));
-          sum_g += RoundDithered(quanta.g, DitherOf(bits, 1));
-          sum_b += RoundDithered(quanta.b, DitherOf(bits, 2));
-          blur += std::llrint(Luminance(flux) * quanta_per_luminance * (whole - inner));
-          ++found;
-        });
+    photons.ForEachWithin(reach.cone, [&](std::size_t i, const ScatteredPhoton& photon, float /*t*/,
+                                          float t2, float radius) {
+      const float t = reach.Depth(photons.position(i));
+      const float cosine = Dot(photon.arrival, direction);
+      const float widening = radii[row] / radius;
+      if (medium.density != nullptr && !has_table) {
+        column_table.Make(*medium.density, reach.from, direction,
+                          static_cast<double>(reach.cone.length));
+        has_table = true;
+      }
+      const float column =
+          has_table ? static_cast<float>(column_table.At(static_cast<double>(t))) : t;
+      const Rgb flux = photon.flux * medium.Transmittance(column) *
+                       (PhaseHenyeyGreenstein(cosine, medium.g) * widening * widening);
+      if (!scale.HasRoomFor(flux)) {
+        ++piece.excess;
+        return;
+      }
+      MarkFound(found_by[i], hitpoint);
+      const float whole = GatherKernel::Shape(t2);
+      const float inner_t2 = t2 / kInnerArea;
+      const float inner = inner_t2 < 1 ? GatherKernel::Shape(inner_t2) / kInnerArea : 0;
+      const std::uint64_t bits = PairBits(photon.key, hitpoint);
+      const Rgb quanta = flux * scale.quanta_per_watt * whole;
+      sum_r += RoundDithered(quanta.r, DitherOf(bits, 0));
+      sum_g += RoundDithered(quanta.g, DitherOf(bits, 1));
+      sum_b += RoundDithered(quanta.b, DitherOf(bits, 2));
+      blur += std::llrint(Luminance(flux) * quanta_per_luminance * (whole - inner));
+      ++found;
+    });
     if (found == 0) return;
     std::array<std::int64_t, kCommonColumns + kMostControllerColumns> columns{};
     columns[kBlurColumn] = blur;

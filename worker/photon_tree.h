@@ -33,6 +33,7 @@ class PhotonTree {
   PhotonTree(const std::vector<Deposits>& deposits, ThreadTeam& team);
 
   [[nodiscard]] std::size_t size() const { return photons_.size(); }
+  [[nodiscard]] Vec3 position(std::size_t photon) const { return positions_[photon]; }
   [[nodiscard]] DepositSource source(std::size_t photon) const {
     return DepositSource::Unpacked(photons_[photon].source);
   }

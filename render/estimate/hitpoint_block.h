@@ -62,9 +62,10 @@ struct MediumSegment {
 };
 
 struct HitpointBlock {
-  std::vector<Vec3> positions;             // [hitpoints]
-  std::vector<std::uint32_t> normals_oct;  // [hitpoints] geometric, on the eye's side
-  std::vector<GlossyHitpoint> glossy;      // [glossy hitpoints]
+  std::vector<Vec3> positions;  // [hitpoints]
+  // [hitpoints] geometric, on the eye's side; of segments, of the surface at which they begin.
+  std::vector<std::uint32_t> normals_oct;
+  std::vector<GlossyHitpoint> glossy;  // [glossy hitpoints]
   // [glossy hitpoints] or empty: of materials that do not depend on the place, no more than default
   // values.
   std::vector<GlossyPlace> places;

@@ -4,6 +4,10 @@
 
 namespace lucerna {
 
+float Medium::GreatestDensity() const {
+  return density != nullptr ? density->largest() : 1;
+}
+
 Medium::Way Medium::TravelUnevenly(Vec3 origin, Vec3 direction, float length, float column) const {
   const DensityGrid::Way way =
       density->Travel(origin, direction, static_cast<double>(length), static_cast<double>(column));

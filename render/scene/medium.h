@@ -42,6 +42,7 @@ struct Medium {
     return {of(absorption.r, scattering.r), of(absorption.g, scattering.g),
             of(absorption.b, scattering.b)};
   }
+  [[nodiscard]] float GreatestDensity() const;
   [[nodiscard]] bool Scatters() const { return !IsBlack(scattering); }
   // What is left of radiance behind a column density [scene units of density 1]; a channel without
   // extinction keeps all of it behind an infinite one too.

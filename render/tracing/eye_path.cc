@@ -370,15 +370,15 @@ bool EyePathTracer::FindThroughMedia(Ray& ray, Hit& hit, std::int32_t& medium, R
   ++rays;
   const bool is_met = intersector_.Intersect(ray, hit);
   if (!parts_.media) return is_met;
-  return media_.Follow(ray, is_met, hit, medium, rays,
-                       [&](const Ray& leg, float t, std::int32_t of_leg) {
-                         if (of_leg != kNoMedium)
-                           transmittance *= media_.TransmittanceOf(of_leg, leg, t);
-                       });
+  return media_.Follow(
+      ray, is_met, hit, medium, rays,
+      [&](const Ray& leg, float t, std::int32_t of_leg, const SurfacePoint* /*entered*/) {
+        if (of_leg != kNoMedium) transmittance *= media_.TransmittanceOf(of_leg, leg, t);
+      });
 }
 
 EyeSegment EyePathTracer::SegmentOf(const Ray& ray, float t, std::int32_t medium, Rgb weight,
-                                    float length_before) const {
+                                    float length_before, Vec3 border) const {
   // What lies so many mean free paths away is not seen, and nothing lies far outside of the scene.
   constexpr float kMostFreePaths = 40;
   constexpr float kMostDiagonals = 8;
@@ -394,7 +394,9 @@ EyeSegment EyePathTracer::SegmentOf(const Ray& ray, float t, std::int32_t medium
           .medium = medium,
           .weight = weight,
           .from_footprint = footprint_at(length_before),
-          .to_footprint = footprint_at(length_before + end)};
+          .to_footprint = footprint_at(length_before + end),
+          .border = Dot(border, ray.direction) < 0 ? border : -border,
+          .free_path = 1 / (MaxChannel(extinction) * through.GreatestDensity())};
 }
 
 std::array<EyePathTracer::SmoothBranch, EyePathTracer::kSmoothLobes> EyePathTracer::SmoothBranches(
@@ -712,8 +714,10 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
   KeyedRng caustic_rng = sampler.ForCaustics();
   std::int32_t medium = parts_.media ? media_.AtCamera() : kNoMedium;
   KeyedRng segment_rng = sampler.ForSegments();
-  float segment_strength = 0;  // sum over the segments so far
-  const auto pass_leg = [&](const Ray& leg, float t, std::int32_t of_leg) {
+  float segment_strength = 0;       // sum over the segments so far
+  std::optional<Vec3> left_normal;  // of the surface that the path has left last
+  const auto pass_leg = [&](const Ray& leg, float t, std::int32_t of_leg,
+                            const SurfacePoint* entered) {
     if (of_leg != kNoMedium) {
       const Rgb transmittance = media_.TransmittanceOf(of_leg, leg, t);
       if (media_[of_leg].Scatters()) {
@@ -722,7 +726,9 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
             MaxChannel(weight * (Gray(1) - transmittance) * media_[of_leg].ScatteredShare());
         segment_strength += strength;
         if (segment_rng.Uniform() * segment_strength < strength) {
-          path.segment = SegmentOf(leg, t, of_leg, weight * (1 / strength), length);
+          const Vec3 border =
+              entered != nullptr ? entered->geometric_normal : left_normal.value_or(-leg.direction);
+          path.segment = SegmentOf(leg, t, of_leg, weight * (1 / strength), length, border);
         }
       }
       weight *= transmittance;
@@ -927,6 +933,7 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
     }
     ray = {LeavingPoint(surface, wi), wi, HUGE_VALF};
     medium = medium_after;
+    left_normal = surface.geometric_normal;
   }
 }
 

@@ -54,6 +54,11 @@ struct EyeSegment {
   std::int32_t medium = kNoMedium;
   Rgb weight;                                  // from radiance scattered at `from`; black: none
   float from_footprint = 0, to_footprint = 0;  // widths of the pixel there [scene units]
+  // Normal of the surface at which it begins, on the eye's side; against its direction where there
+  // is none.
+  Vec3 border;
+  float free_path =
+      0;  // shortest mean one of the medium [scene units]; infinite without extinction
 };
 
 // The end of one eye path.
@@ -250,8 +255,9 @@ class EyePathTracer {
   void EndBelow(const ShadingPoint& entered, Rgb weight, float length, const SobolPoint& below,
                 const SobolPoint& u, bool is_lit_here, EyePath& path) const;
   // A part of an eye path that ends after `t`.
+  // `border`: EyeSegment's.
   [[nodiscard]] EyeSegment SegmentOf(const Ray& ray, float t, std::int32_t medium, Rgb weight,
-                                     float length_before) const;
+                                     float length_before, Vec3 border) const;
 
   const Scene& scene_;
   const RenderSettings& settings_;

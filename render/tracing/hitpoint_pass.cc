@@ -32,6 +32,11 @@ constexpr float kSegmentShare = 0.5F;
 // photons near a camera in fog were bright dots over the whole image.
 constexpr float kLeastNarrowing = 0.5F;
 
+// And its first radius is at most so many mean free paths r. What a disc of radius a finds on a
+// surface bent like a ball of radius b lies up to a²/(2b) deeper or less deep than on a flat one:
+// 32 r²/b, a third of a free path where b is a hundred of them.
+constexpr float kMostFreePaths = 8;
+
 // At most about so many pixels tell where the hitpoints of an image are.
 constexpr double kExtentPixels = 16384;
 
@@ -39,8 +44,12 @@ float UnitRadiusOf(const EyePathTracer& tracer, const EyeHitpoint& hitpoint) {
   return tracer.settings().initial_radius == 0 ? HeldWidth(hitpoint.footprint) : 1.0F;
 }
 float UnitRadiusOf(const EyePathTracer& tracer, const EyeSegment& segment) {
-  return tracer.settings().initial_radius == 0 ? kSegmentShare * HeldWidth(segment.to_footprint)
-                                               : kSegmentShare;
+  const RenderSettings& settings = tracer.settings();
+  const bool is_given = settings.initial_radius != 0;
+  const float unit = kSegmentShare * (is_given ? 1 : HeldWidth(segment.to_footprint));
+  const auto first =
+      static_cast<float>(is_given ? settings.initial_radius : settings.initial_footprints);
+  return std::min(unit, HeldWidth(kMostFreePaths * segment.free_path / first));
 }
 
 }  // namespace
@@ -184,9 +193,9 @@ EyePass TraceHitpointPass(const EyePathTracer& tracer, std::uint64_t pass, First
         keep(place, path.hitpoint, tile.rows);
         keep(place, path.caustic, tile.caustic_rows);
         if (const EyeSegment& segment = path.segment; !IsBlack(segment.weight)) {
-          tile.segment_rows.rows.push_back({place.pixel, segment.from, EncodeOctahedral({0, 0, 1}),
-                                            segment.weight * place.share,
-                                            UnitRadiusOf(tracer, segment), place.path});
+          tile.segment_rows.rows.push_back(
+              {place.pixel, segment.from, EncodeOctahedral(segment.border),
+               segment.weight * place.share, UnitRadiusOf(tracer, segment), place.path});
           ++tile.segment_rows.count;
           tile.segments.push_back({segment.to, static_cast<std::uint32_t>(segment.medium),
                                    automatic

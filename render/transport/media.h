@@ -54,8 +54,9 @@ class Media {
 
   // Follows a ray through interfaces to the first surface that is none; false when there is none.
   // `is_met`, `hit`: what the ray meets first, found already; `hit` and `ray` become those of that
-  // surface, `medium` the one before it. Calls on_leg(ray, t, medium) for the way through
-  // each medium or empty space, t infinite where nothing is met.
+  // surface, `medium` the one before it. Calls on_leg(ray, t, medium, entered) for the way through
+  // each medium or empty space, t infinite where nothing is met; `entered` is the interface at
+  // which it begins, nullptr for the first.
   template <typename OnLeg>
   [[nodiscard]] bool Follow(Ray& ray, bool is_met, Hit& hit, std::int32_t& medium, int& rays,
                             const OnLeg& on_leg) const;
@@ -88,11 +89,12 @@ inline constexpr int kMostInterfaces = 1000;
 template <typename OnLeg>
 bool Media::Follow(Ray& ray, bool is_met, Hit& hit, std::int32_t& medium, int& rays,
                    const OnLeg& on_leg) const {
+  SurfacePoint surface;
   for (int i = 0; i < kMostInterfaces; ++i) {
-    on_leg(ray, is_met ? hit.t : HUGE_VALF, medium);
+    on_leg(ray, is_met ? hit.t : HUGE_VALF, medium, i == 0 ? nullptr : &surface);
     if (!is_met) return false;
     if (!has_interfaces_) return true;
-    const SurfacePoint surface = intersector_.SurfaceAt(ray, hit);
+    surface = intersector_.SurfaceAt(ray, hit);
     if (!IsInterface(surface)) return true;
     medium = Beyond(surface, ray.direction, medium);
     ray = {LeavingPoint(surface, ray.direction), ray.direction, HUGE_VALF};

@@ -196,6 +196,38 @@ INSTANTIATE_TEST_SUITE_P(Densities, SingleScatteringTest,
                            return test.param.per_x == 0 ? "Even" : "Growing";
                          });
 
+// A ball of a medium that absorbs nothing, in a place where light comes from everywhere, cannot be
+// told from what is behind it, however thick it is. Its border is seen at a slant, and a disc
+// across a segment is as wide as the free path is long. What is left is that the ball bends away
+// from the plane by which depth is measured: within a disc of radius a by x²/(2b), and the mean of
+// x² under Epanechnikov's kernel is a²/6 across the slant, and more along it by the square of
+// 1/cosine.
+TEST(ThickMediumTest, IsAsBrightAsWhatIsAroundItWhereItsBorderIsSlanted) {
+  constexpr float kBall = 0.5F;
+  constexpr float kExtinction = 20;
+  constexpr double kDisc = 0.05;
+  Scene scene;
+  scene.media = {GrayMedium(0, kExtinction)};
+  const std::int32_t black = AddMaterial(scene, DiffuseMaterial(0));
+  AddSphere(scene, {0, 0, 0}, 1.2F, black, AddAreaLight(scene, 1), /*inward=*/true);
+  Material interface;
+  interface.kind = Material::Kind::kInterface;
+  AddSphere(scene, {0, 0, 0}, kBall, AddMaterial(scene, interface));
+  scene.spheres[1].traits.medium_inside = 0;
+  const Vec3 eye = {0, 0, -1.15F};
+  const Vec3 target = {0.25F, 0, -0.433F};
+  SetCamera(scene, {0, 0, -1.15}, {0.25, 0, -0.433}, {0, 1, 0}, 8, 4);
+  RenderSettings settings = TestSettings(scene, 600000, 2 * kDisc, 1000);
+  settings.alpha = 1;  // radii are held
+  const auto cosine = static_cast<double>(-Dot(Normalize(target - eye), target / kBall));
+  const double deeper =
+      kDisc * kDisc / 6 * (1 + 1 / (cosine * cosine)) / (2 * static_cast<double>(kBall)) / cosine;
+  const double lost = static_cast<double>(kExtinction) * deeper;
+  EXPECT_NEAR(lost, 0.042, 0.002);
+  // The next term of the exponential is a tenth of it or less.
+  ExpectMean(Measure(scene, settings, 4, kParts, "G"), 1 - lost, 0.1 * lost);
+}
+
 // A beam of light through a box of fog without borders of its own: light behind an interface, seen
 // through it, and a wall lit through it, as Beer's law says.
 TEST(InterfaceTest, IsPassedByEyePathsShadowRaysAndPhotons) {

@@ -107,7 +107,7 @@ EyePass ExpectedPass(const EyePathTracer& tracer, std::uint64_t pass, const EyeP
   for (std::size_t i = 0; i < paths.size(); ++i) {
     const EyeSegment& segment = paths[i].segment;
     if (IsBlack(segment.weight)) continue;
-    add(pixels[i], segment.from, {0, 0, 1}, segment.weight, segment.to_footprint / 2);
+    add(pixels[i], segment.from, segment.border, segment.weight, segment.to_footprint / 2);
     expected.block.segments.push_back(
         {segment.to, static_cast<std::uint32_t>(segment.medium),
          std::clamp(segment.from_footprint / segment.to_footprint, 0.5F, 1.0F)});

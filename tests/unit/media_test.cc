@@ -14,6 +14,7 @@
 #include "render/math/warp.h"
 #include "tests/support/gather_sums.h"
 #include "tests/support/test_scenes.h"
+#include "worker/gather_segments.h"
 #include "worker/photon_grid.h"
 #include "worker/photon_tree.h"
 
@@ -153,6 +154,30 @@ TEST(PhotonTreeTest, FindsThePhotonsThatASearchOfAllFinds) {
   }
 }
 
+// A border in the plane z = 0, seen along (1, 0, -1) / sqrt(2): a photon lies sqrt(2) times as deep
+// along that direction as below the border, wherever the segment begins, and those are found that
+// lie beside the segment before its beginning.
+TEST(SegmentReachTest, DepthCountsFromTheBorder) {
+  HitpointBlock block;
+  block.positions = {{0, 0, 0}, {1, 2, 0}};
+  block.normals_oct = {0, EncodeOctahedral({0, 0, 1})};
+  block.segments = {{{4, 2, -3}, 0, 0.5F}};
+  const SegmentReach reach(block, 0, 0.2F);
+  for (const float below : {0.0F, 0.01F, 0.3F}) {
+    for (const float x : {0.8F, 1.0F, 1.5F})
+      EXPECT_NEAR(reach.Depth({x, 2.1F, -below}), below * std::sqrt(2.0F), 1e-4F);
+  }
+  EXPECT_EQ(reach.Depth({1, 2, 0.1F}), 0);
+  // The disc of radius 0.1 at the beginning reaches 0.1 before and behind it.
+  EXPECT_NEAR(reach.cone.length, 3 * std::sqrt(2.0F) + 0.1F, 1e-4F);
+  EXPECT_NEAR(Length(reach.cone.origin - Vec3{1, 2, 0}), 0.1F, 1e-4F);
+  EXPECT_EQ(reach.cone.first_radius, 0.1F);
+  EXPECT_EQ(reach.cone.last_radius, 0.2F);
+  // Where no surface is, a segment begins at right angles to itself.
+  block.normals_oct[1] = EncodeOctahedral(Normalize(Vec3{-1, 0, 1}));
+  EXPECT_NEAR(SegmentReach(block, 0, 0.2F).cone.length, 3 * std::sqrt(2.0F), 1e-4F);
+}
+
 // Segments come behind any number of surfaces, and each gathers once.
 TEST(GatherTest, EachSegmentGathersOnceWhereverItsRowIs) {
   KeyedRng rng(5);
@@ -178,18 +203,18 @@ TEST(GatherTest, EachSegmentGathersOnceWhereverItsRowIs) {
     SCOPED_TRACE(surfaces);
     HitpointBlock block;
     block.positions.assign(surfaces, {9, 9, 9});
+    block.normals_oct.resize(surfaces);
+    for (std::size_t i = 0; i < kSegments; ++i) {
+      block.positions.push_back(random_point());
+      block.normals_oct.push_back(EncodeOctahedral(Normalize(random_point())));
+      block.segments.push_back({random_point(), 0, 1});
+    }
     std::vector<std::uint32_t> expected(surfaces);
     for (std::size_t i = 0; i < kSegments; ++i) {
-      const Vec3 from = random_point();
-      const Vec3 end = random_point();
-      block.positions.push_back(from);
-      block.segments.push_back({end, 0, 1});
       std::uint32_t count = 0;
-      tree.ForEachWithin({from, Normalize(end - from), Length(end - from), 0.1F, 0.1F},
-                         [&](auto&&...) { ++count; });
+      tree.ForEachWithin(SegmentReach(block, i, 0.1F).cone, [&](auto&&...) { ++count; });
       expected.push_back(count);
     }
-    block.normals_oct.resize(block.size());
     std::vector<std::uint32_t> found_by(tree.size(), kNotFound);
     const GatheredPhotons photons = {
         .grid = grid, .scattered = &tree, .media = &media, .scattered_found_by = found_by};
