@@ -42,10 +42,12 @@ struct SegmentReach {
     if (!(length > 0)) return;
     const Vec3 direction = way / length;
     const float first_radius = segment.narrowing * last_radius;
-    // More slanted borders count as this one.
-    constexpr float kLeastFacing = 0.2F;
+    constexpr float kLeastFacing = 1e-3F;
     facing = std::clamp(-Dot(border, direction), kLeastFacing, 1.0F);
-    const float before = first_radius * std::sqrt(1 - facing * facing) / facing;
+    // Along outlines the disc would reach very far before the beginning.
+    constexpr float kSteepest = 5;
+    const float slope = std::min(std::sqrt(1 - facing * facing) / facing, kSteepest);
+    const float before = first_radius * slope;
     cone = {from - direction * before, direction, length + before, first_radius, last_radius};
   }
   // Along the segment's direction.
