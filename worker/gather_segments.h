@@ -47,16 +47,20 @@ struct SegmentReach {
     // Along outlines the disc would reach very far before the beginning.
     constexpr float kSteepest = 5;
     const float slope = std::min(std::sqrt(1 - facing * facing) / facing, kSteepest);
-    const float before = first_radius * slope;
+    before = first_radius * slope;
     cone = {from - direction * before, direction, length + before, first_radius, last_radius};
   }
-  // Along the segment's direction.
-  [[nodiscard]] float Depth(Vec3 photon) const {
-    return std::max(0.0F, Dot(from - photon, border) / facing);
+  // Of a photon `along` the cone, in the segment's direction; below 0: it does not count. Behind
+  // the plane there is nothing of a medium that begins there. Beside a convex object in a medium
+  // there is: what lies along the segment counts, as at the border.
+  [[nodiscard]] float Depth(Vec3 photon, float along) const {
+    const float depth = Dot(from - photon, border) / facing;
+    return depth < 0 && along >= before ? 0 : depth;
   }
 
   Vec3 from, border;
   float facing = 1;
+  float before = 0;  // what of the cone lies before the segment's beginning
   PhotonTree::Cone cone;
 };
 
@@ -67,12 +71,11 @@ struct SegmentReach {
 //   Φ p(θ) T(t) K(d² / r(t)²) r² / r(t)²
 //
 // where p is the phase function, T the transmittance from the border (of the column density up to
-// t), K the kernel's shape and r
-// the radius at the end, by whose square all sums are divided later. Photons carry the flux that
-// was scattered. Rows as in Gather, with zeros for the radius controller's evidence: radii of
-// segments follow a schedule (Knaus & Zwicker 2011, "Progressive Photon Mapping: A Probabilistic
-// Approach"), with the exponent of surfaces, because the kernel has two dimensions too. Adds to
-// `sums` as Gather does.
+// t), K the kernel's shape and r the radius at the end, by whose square all sums are divided later.
+// Photons carry the flux that was scattered. Rows as in Gather, with zeros for the radius
+// controller's evidence: radii of segments follow a schedule (Knaus & Zwicker 2011, "Progressive
+// Photon Mapping: A Probabilistic Approach"), with the exponent of surfaces, because the kernel has
+// two dimensions too. Adds to `sums` as Gather does.
 template <typename GatherKernel>
 std::vector<GatherPiece> GatherSegments(const HitpointBlock& block, const RadiusColumn& radii,
                                         const PhotonTree& photons,
@@ -105,9 +108,10 @@ std::vector<GatherPiece> GatherSegments(const HitpointBlock& block, const Radius
     std::int64_t sum_g = 0;
     std::int64_t sum_b = 0;
     std::int64_t blur = 0;
-    photons.ForEachWithin(reach.cone, [&](std::size_t i, const ScatteredPhoton& photon, float /*t*/,
+    photons.ForEachWithin(reach.cone, [&](std::size_t i, const ScatteredPhoton& photon, float along,
                                           float t2, float radius) {
-      const float t = reach.Depth(photons.position(i));
+      const float t = reach.Depth(photons.position(i), along);
+      if (t < 0) return;
       const float cosine = Dot(photon.arrival, direction);
       const float widening = radii[row] / radius;
       if (medium.density != nullptr && !has_table) {

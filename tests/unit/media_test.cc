@@ -165,9 +165,11 @@ TEST(SegmentReachTest, DepthCountsFromTheBorder) {
   const SegmentReach reach(block, 0, 0.2F);
   for (const float below : {0.0F, 0.01F, 0.3F}) {
     for (const float x : {0.8F, 1.0F, 1.5F})
-      EXPECT_NEAR(reach.Depth({x, 2.1F, -below}), below * std::sqrt(2.0F), 1e-4F);
+      EXPECT_NEAR(reach.Depth({x, 2.1F, -below}, 1), below * std::sqrt(2.0F), 1e-4F);
   }
-  EXPECT_EQ(reach.Depth({1, 2, 0.1F}), 0);
+  // Above the border, beside the segment and before it.
+  EXPECT_EQ(reach.Depth({1.1F, 2, 0.01F}, 0.11F), 0);
+  EXPECT_LT(reach.Depth({0.95F, 2, 0.01F}, 0.05F), 0);
   // The disc of radius 0.1 at the beginning reaches 0.1 before and behind it.
   EXPECT_NEAR(reach.cone.length, 3 * std::sqrt(2.0F) + 0.1F, 1e-4F);
   EXPECT_NEAR(Length(reach.cone.origin - Vec3{1, 2, 0}), 0.1F, 1e-4F);
@@ -212,7 +214,11 @@ TEST(GatherTest, EachSegmentGathersOnceWhereverItsRowIs) {
     std::vector<std::uint32_t> expected(surfaces);
     for (std::size_t i = 0; i < kSegments; ++i) {
       std::uint32_t count = 0;
-      tree.ForEachWithin(SegmentReach(block, i, 0.1F).cone, [&](auto&&...) { ++count; });
+      const SegmentReach reach(block, i, 0.1F);
+      tree.ForEachWithin(reach.cone, [&](std::size_t photon, const ScatteredPhoton& /*of_it*/,
+                                         float along, float /*t2*/, float /*radius*/) {
+        if (reach.Depth(tree.position(photon), along) >= 0) ++count;
+      });
       expected.push_back(count);
     }
     std::vector<std::uint32_t> found_by(tree.size(), kNotFound);
