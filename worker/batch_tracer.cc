@@ -85,10 +85,20 @@ Sum SumOfPieces(ThreadTeam& team, std::size_t count, const Body& body, const Add
   return sum;
 }
 
+// The box around what region_of(begin, end) gives for the pieces of [0, count).
+template <typename RegionOfPiece>
+Bounds RegionOfPieces(ThreadTeam& team, std::size_t count, const RegionOfPiece& region_of) {
+  return SumOfPieces<Bounds>(team, count, region_of, [](Bounds& region, const Bounds& piece) {
+    if (piece.empty()) return;
+    region.Add(piece.low);
+    region.Add(piece.high);
+  });
+}
+
 // The box in which a photon can be found by some hitpoint.
 Bounds RegionOf(const HitpointBlock& block, const RadiusColumn& radii, float radii_reach,
                 ThreadTeam& team) {
-  const auto of_rows = [&](std::size_t begin, std::size_t end) {
+  return RegionOfPieces(team, block.first_segment(), [&](std::size_t begin, std::size_t end) {
     Bounds region;
     for (std::size_t row = begin; row < end; ++row) {
       const float r = radii_reach * radii[row];
@@ -97,28 +107,24 @@ Bounds RegionOf(const HitpointBlock& block, const RadiusColumn& radii, float rad
       region.Add(block.positions[row] + reach);
     }
     return region;
-  };
-  return SumOfPieces<Bounds>(team, block.first_segment(), of_rows,
-                             [](Bounds& region, const Bounds& piece) {
-                               if (piece.empty()) return;
-                               region.Add(piece.low);
-                               region.Add(piece.high);
-                             });
+  });
 }
 
 // The box in which a photon that a medium scattered can be found by some segment.
-Bounds MediaRegionOf(const HitpointBlock& block, const RadiusColumn& radii) {
-  Bounds region;
-  for (std::size_t i = 0; i < block.segments.size(); ++i) {
-    const float radius = radii[block.first_segment() + i];
-    const Vec3 around = {radius, radius, radius};
-    const PhotonTree::Cone& cone = SegmentReach(block, i, radius).cone;
-    for (const Vec3 end : {cone.origin, cone.origin + cone.direction * cone.length}) {
-      region.Add(end - around);
-      region.Add(end + around);
+Bounds MediaRegionOf(const HitpointBlock& block, const RadiusColumn& radii, ThreadTeam& team) {
+  return RegionOfPieces(team, block.segments.size(), [&](std::size_t begin, std::size_t end) {
+    Bounds region;
+    for (std::size_t i = begin; i < end; ++i) {
+      const float radius = radii[block.first_segment() + i];
+      const Vec3 around = {radius, radius, radius};
+      const PhotonTree::Cone cone = SegmentReach(block, i, radius).cone;
+      for (const Vec3 at : {cone.origin, cone.origin + cone.direction * cone.length}) {
+        region.Add(at - around);
+        region.Add(at + around);
+      }
     }
-  }
-  return region;
+    return region;
+  });
 }
 
 // Cells twice as wide as the middle radius: a hitpoint meets two to three of them along an axis,
@@ -313,7 +319,7 @@ StatusOr<PassSums> BatchTracer::GatherPhotons(const RenderSettings& settings,
   const Evidence evidence = EvidenceOf(settings.radius_controller, pass);
   const PreparedScene& prepared = state_->prepared;
   const Bounds region = RegionOf(block, radii, ReachOf(evidence), state_->team);
-  const Bounds media_region = MediaRegionOf(block, radii);
+  const Bounds media_region = MediaRegionOf(block, radii, state_->team);
   const std::size_t first_caustic = block.first_caustic();
   const float cell = CellWidth(std::span(radii).first(first_caustic));
   const float caustic_cell = CellWidth(std::span(radii).subspan(first_caustic, block.caustic_rows));

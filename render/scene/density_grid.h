@@ -62,7 +62,6 @@ class DensityGrid {
   [[nodiscard]] const std::array<int, 3>& size() const { return size_; }
   [[nodiscard]] float largest() const { return largest_; }
   [[nodiscard]] std::size_t bytes() const { return values_.size() * sizeof(float); }
-  bool operator==(const DensityGrid&) const = default;
 
  private:
   friend class ColumnTable;

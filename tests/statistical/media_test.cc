@@ -196,8 +196,8 @@ INSTANTIATE_TEST_SUITE_P(Densities, SingleScatteringTest,
                            return test.param.per_x == 0 ? "Even" : "Growing";
                          });
 
-// A ball of a medium that absorbs nothing, in a place where light comes from everywhere, cannot be
-// told from what is behind it, however thick it is. Its border is seen at a slant, and a disc
+// A ball of a medium that absorbs nothing, in a place where light comes from everywhere, looks like
+// what is behind it, however thick it is. Its border is seen at a slant, and a disc
 // across a segment is as wide as the free path is long. What is left is that the ball bends away
 // from the plane by which depth is measured: within a disc of radius a by x²/(2b), and the mean of
 // x² under Epanechnikov's kernel is a²/6 across the slant, and more along it by the square of

@@ -8,7 +8,6 @@
 #include <span>
 #include <string>
 #include <string_view>
-#include <utility>
 #include <vector>
 
 #include "render/base/text.h"
@@ -143,8 +142,7 @@ Medium ReadMedium(ParameterList& parameters, const Transform& to_world) {
   medium.scattering *= scale;
   medium.absorption_spectrum.factor = scale;
   medium.scattering_spectrum.factor = scale;
-  const float densest = medium.density != nullptr ? medium.density->largest() : 1;
-  if (!IsFinite(medium.Extinction() * densest))
+  if (!IsFinite(medium.Extinction() * medium.GreatestDensity()))
     parameters.Error("scale", "makes a coefficient too large");
   medium.g = static_cast<float>(parameters.Float("g", 0, kMeanCosine));
   RefuseEmission(parameters, is_grid);
