@@ -18,6 +18,12 @@ Rgb ValueOf(const Scene& scene, const Material& material, Rgb color) {
   return TexturedValueAtWavelengths(material.kind, scene.uplift->Reflectance(color));
 }
 
+// No surface scatters more than falls in.
+Rgb Scaled(Rgb color, float scale) {
+  return {std::min(color.r * scale, 1.0F), std::min(color.g * scale, 1.0F),
+          std::min(color.b * scale, 1.0F)};
+}
+
 // A number in [0, 1) that belongs to a place and a direction: their bits, mixed.
 float NumberOf(Vec3 position, Vec3 direction) {
   const auto pair = [](float a, float b) {
@@ -122,11 +128,11 @@ const Material& AtPlace(const Scene& scene, SurfacePoint& point, Vec3 wo,
   static_cast<MaterialNumbers&>(here) = static_cast<const MaterialNumbers&>(material);
   if (material.texture != kNoTexture) {
     const Rgb color = TextureColor(scene.textures, material.texture, place);
-    SetTexturedParameter(here, ValueOf(scene, material, color * material.texture_scale));
+    SetTexturedParameter(here, ValueOf(scene, material, Scaled(color, material.texture_scale)));
   }
   if (material.second_texture != kNoTexture) {
     const Rgb color = TextureColor(scene.textures, material.second_texture, place);
-    here.transmittance = ValueOf(scene, material, color * material.texture_scale);
+    here.transmittance = ValueOf(scene, material, Scaled(color, material.texture_scale));
   }
   if (material.Disperses() && wavelength.is_drawn())
     here.ior = IndexAt(wavelength.nm(), material.ior, material.dispersion);

@@ -89,6 +89,30 @@ TEST(PbrtParserTest, MatricesAreWrittenColumnByColumn) {
   EXPECT_EQ(scene.spheres[0].radius, 2);
 }
 
+// What the fourth row does to points has no place here.
+TEST(PbrtParserTest, ThingsWithAPlaceNeedTransformsThatAreAffine) {
+  const std::string matrix = "ConcatTransform [0 0 1 0  1 0 0 0  0 1 0 8.9  0 0 0 1] ";
+  const std::string wrong = "needs a transform that is affine";
+  for (const char* const thing :
+       {"Shape \"sphere\"", "LightSource \"point\"", "Texture \"t\" \"spectrum\" \"checkerboard\"",
+        "CoordinateSystem \"c\" Identity CoordSysTransform \"c\" Scale 2 2 2 Shape \"disk\""})
+    EXPECT_THAT(SaidOfWorld(matrix + thing), HasSubstr(wrong)) << thing;
+  EXPECT_THAT(SaidOfWorld(matrix + "Identity Shape \"sphere\""), Not(HasSubstr(wrong)));
+  EXPECT_THAT(SaidOfPbrt(matrix + "Camera \"perspective\" WorldBegin"), HasSubstr(wrong));
+}
+
+TEST(PbrtParserTest, OfTwoCamerasTheLastCounts) {
+  const ParsedScene parsed = ParsePbrt(
+      "Camera \"perspective\" \"float fov\" 30 \"float lensradius\" 2\n"
+      "Translate 0 0 -4 Camera \"perspective\" \"float fov\" 50 WorldBegin Shape \"sphere\"");
+  ASSERT_TRUE(parsed.ok()) << parsed.ToStatus();
+  EXPECT_EQ(parsed.scene.camera.fov_deg, 50);
+  EXPECT_EQ(parsed.scene.camera.lens_radius, 0);
+  EXPECT_EQ(parsed.scene.camera.camera_to_world, Transform::Translate(0, 0, 4));
+  EXPECT_THAT(SaidOf(parsed), HasSubstr("s.pbrt:2:18: warning: Camera \"perspective\" takes the "
+                                        "place of the camera before it"));
+}
+
 TEST(PbrtParserTest, FilmCropAndExposure) {
   const Scene scene =
       ParsePbrt(
@@ -359,8 +383,16 @@ TEST(PbrtParserTest, NamedMaterialsMayComeLaterAndScopesEnd) {
   EXPECT_EQ(kind(0), Material::Kind::kConductor);
   EXPECT_EQ(kind(1), Material::Kind::kDielectric);
   EXPECT_EQ(kind(2), Material::Kind::kConductor);
-  EXPECT_THAT(SaidOfWorld("NamedMaterial \"none\""), HasSubstr("s.pbrt:2:1: error: there is no "
-                                                               "material \"none\""));
+  EXPECT_THAT(SaidOfWorld("NamedMaterial \"none\" Shape \"sphere\""),
+              HasSubstr("s.pbrt:2:1: error: there is no material \"none\"; define it"));
+}
+
+// As in pbrt-v4, which asks for it when a shape is made.
+TEST(PbrtParserTest, AMaterialThatNoShapeAsksForMayBeMissing) {
+  const std::string said =
+      SaidOfWorld("AttributeBegin NamedMaterial \"none\" AttributeEnd Shape \"sphere\"");
+  EXPECT_THAT(said, HasSubstr("s.pbrt:2:16: warning: there is no material \"none\"; no shape"));
+  EXPECT_THAT(said, Not(HasSubstr("error")));
 }
 
 // ---- lights
@@ -470,6 +502,23 @@ TEST(PbrtParserTest, IncludeAndImport) {
   ExpectNear(scene.spheres[0].center, {1, 1, 0});
   ExpectNear(scene.spheres[1].center, {1, 1, 1});
   ExpectNear(scene.spheres[2].center, {1, 1, 0});  // an import leaves no trace
+}
+
+// pbrt-v4 reads the files as one text.
+TEST(PbrtParserTest, ParametersGoOnAfterTheFileInWhichTheyBegin) {
+  const std::map<std::string, std::string> files = {
+      {"a.pbrt", "Shape \"sphere\" Shape \"sphere\" \"float radius\" 2"},
+      {"outer.pbrt", "Include \"a.pbrt\" \"float phimax\" 360"}};
+  const Scene scene = ReadWorld(
+      "Include \"outer.pbrt\" \"float alpha\" [0.5] Translate 1 0 0 Shape \"sphere\"", files);
+  ASSERT_EQ(scene.spheres.size(), 3U);
+  EXPECT_EQ(scene.spheres[0].radius, 1);
+  EXPECT_EQ(scene.spheres[1].radius, 2);
+  EXPECT_EQ(scene.spheres[1].traits.alpha, 0.5F);
+  ExpectNear(scene.spheres[2].center, {1, 0, 0});
+  // Not out of an import, which is a text of its own.
+  EXPECT_THAT(SaidOf(ParseWorld("Import \"a.pbrt\" \"float zmin\" -1", files)),
+              HasSubstr("s.pbrt:2:17: error: expected a directive, not \"float zmin\""));
 }
 
 TEST(PbrtParserTest, IncludesEnd) {
@@ -709,6 +758,15 @@ TEST(PbrtParserTest, EnvironmentMapsAreSquareAndPlaced) {
   EXPECT_EQ(scene.infinite_lights[0].radiance, Gray(0.5F));
   ExpectNear(scene.infinite_lights[0].axes.x, {0, 1, 0});
   ExpectNear(scene.infinite_lights[0].axes.y, {-1, 0, 0});
+  // A direction does not see a fourth row.
+  const ParsedScene projective = ParsePbrt(
+      "Camera \"perspective\" WorldBegin ConcatTransform [0 1 0 0  -1 0 0 0  0 0 1 8.9  0 0 0 1] "
+      "LightSource \"infinite\" \"string filename\" \"sky.pfm\"",
+      files);
+  EXPECT_THAT(SaidOf(projective), HasSubstr("warning: LightSource \"infinite\" has a transform"));
+  ASSERT_TRUE(projective.ok());
+  ExpectNear(projective.scene.infinite_lights[0].axes.x, {0, 1, 0});
+  ExpectNear(projective.scene.infinite_lights[0].axes.y, {-1, 0, 0});
   // As bright as a constant light of that illuminance: 3 times the scale is 1 / pi.
   const Scene lux = ReadWorld(
       "LightSource \"infinite\" \"string filename\" \"sky.pfm\" \"float illuminance\" 1", files);
@@ -820,6 +878,12 @@ TEST(PbrtParserTest, ReadsSheets) {
   EXPECT_EQ(scene.materials[2].reflectance, Gray(0.2F));
   EXPECT_NE(scene.materials[2].second_texture, kNoTexture);
   EXPECT_EQ(scene.materials[2].texture_scale, 0.5F);
+  const Scene bright = ReadWorld(
+      "Material \"diffusetransmission\" \"rgb reflectance\" [0.1 0.2 0.6] \"float scale\" 3 "
+      "\"spectrum transmittance\" [300 0.5 800 0.5] Shape \"sphere\"");
+  ExpectNear(bright.materials[1].reflectance, Rgb{0.3F, 0.6F, 1});
+  ExpectNear(bright.materials[1].transmittance, Gray(1));
+  EXPECT_EQ(bright.materials[1].given.spectra->transmittance.curve->At(500), 1);
   EXPECT_EQ(scene.materials[3].kind, Material::Kind::kThinDielectric);
   EXPECT_EQ(scene.materials[3].ior, 1.7F);
 }

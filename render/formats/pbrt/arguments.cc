@@ -95,10 +95,16 @@ bool Arguments::ReadParameters(std::vector<Parameter>& parameters) {
     parameters = std::move(made_->parameters);
     return true;
   }
-  while (tokens_->Peek().kind == Token::Kind::kString) {
-    if (!ReadParameter(parameters)) return false;
+  while (true) {
+    const Token::Kind next = tokens_->Peek().kind;
+    if (next == Token::Kind::kEnd && tokens_->including() != nullptr) {
+      tokens_ = tokens_->including();
+    } else if (next != Token::Kind::kString) {
+      return true;
+    } else if (!ReadParameter(parameters)) {
+      return false;
+    }
   }
-  return true;
 }
 
 bool Arguments::ReadParameter(std::vector<Parameter>& parameters) {

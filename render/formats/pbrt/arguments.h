@@ -50,7 +50,8 @@ class Arguments {
   bool ReadNumbers(std::span<double> numbers);
   // A string, which messages call `what`.
   bool ReadString(std::string_view what, std::string& out);
-  // All parameters there are.
+  // All parameters there are. A list that reaches the end of an included file goes on after the
+  // Include, as in pbrt-v4.
   bool ReadParameters(std::vector<Parameter>& parameters);
   // The type in quotes that follows the directive, then its parameters.
   bool ReadTyped(std::string& type, std::vector<Parameter>& parameters);
@@ -64,7 +65,7 @@ class Arguments {
 
   const std::string_view directive_;
   const SourceLocation location_;
-  Tokenizer* const tokens_ = nullptr;  // one of the two
+  Tokenizer* tokens_ = nullptr;  // one of the two
   MadeDirective* const made_ = nullptr;
   std::size_t strings_read_ = 0;  // of `made_`
   Diagnostics& diagnostics_;

@@ -87,7 +87,7 @@ bool IsDirective(std::string_view word) {
 
 UnfinishedScene DirectiveReader::Read(const std::string& main_path, std::string_view text) {
   ++texts_read_;
-  ReadText(main_path, text);
+  ReadText(main_path, text, nullptr);
   return Finish();
 }
 
@@ -114,7 +114,8 @@ UnfinishedScene DirectiveReader::Finish() {
 
 // ---- texts
 
-void DirectiveReader::IncludeFile(const std::string& path, const SourceLocation& location) {
+void DirectiveReader::IncludeFile(const std::string& path, const SourceLocation& location,
+                                  Tokenizer* including) {
   const SceneLimits& limits = assets_.limits();
   if (depth_ >= limits.max_include_depth) {
     // What comes next may need what is left out.
@@ -134,13 +135,14 @@ void DirectiveReader::IncludeFile(const std::string& path, const SourceLocation&
   }
   const StatusOr<std::string> text = assets_.ReadText(path);
   if (text.ok()) {
-    ReadText(path, *text);
+    ReadText(path, *text, including);
   } else {
     diagnostics_.Error(location, std::string(text.status().message()));
   }
 }
 
-void DirectiveReader::ReadText(const std::string& path, std::string_view text) {
+void DirectiveReader::ReadText(const std::string& path, std::string_view text,
+                               Tokenizer* including) {
   const std::string* name = diagnostics_.NameOfFile(path);
   // The mark with which some editors begin UTF-8.
   if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
@@ -148,7 +150,7 @@ void DirectiveReader::ReadText(const std::string& path, std::string_view text) {
     diagnostics_.Error({name, 0, 0}, "this is not a pbrt text file: it holds binary data");
     return;
   }
-  Tokenizer tokens(name, text, diagnostics_);
+  Tokenizer tokens(name, text, diagnostics_, including);
   ++depth_;
   open_texts_.push_back(path);
   ReadDirectives(tokens);
@@ -248,10 +250,15 @@ void DirectiveReader::ReportNamedMaterials() {
     }
   }
   for (const auto& [name, material] : named_materials_) {
-    if (!material.is_defined) {
+    const auto index = static_cast<std::size_t>(material.index);
+    const bool is_on_shapes = index < materials_on_shapes_.size() && materials_on_shapes_[index];
+    if (!material.is_defined && is_on_shapes) {
       diagnostics_.Error(material.location, Concat("there is no material ", Quoted(name),
                                                    "; define it by MakeNamedMaterial"));
-    } else if (!material.is_used && is_mixed[static_cast<std::size_t>(material.index)] == 0) {
+    } else if (!material.is_defined) {
+      diagnostics_.Warning(material.location,
+                           Concat("there is no material ", Quoted(name), "; no shape asks for it"));
+    } else if (!material.is_used && is_mixed[index] == 0) {
       diagnostics_.Note(material.location, Concat("the material ", Quoted(name), " is not used"));
     }
   }
@@ -407,7 +414,7 @@ bool DirectiveReader::OnWorldBegin(Arguments& /*arguments*/) {
 bool DirectiveReader::OnInclude(Arguments& arguments) {
   std::string path;
   if (!arguments.ReadString("a file name", path)) return false;
-  IncludeFile(path, arguments.location());
+  IncludeFile(path, arguments.location(), &arguments.tokens());
   return true;
 }
 
@@ -417,7 +424,7 @@ bool DirectiveReader::OnImport(Arguments& arguments) {
   if (!arguments.ReadString("a file name", path)) return false;
   const std::size_t outer_scopes = graphics_.open_scopes().size();
   Begin(arguments);
-  IncludeFile(path, arguments.location());
+  IncludeFile(path, arguments.location(), nullptr);
   if (IsStopped()) return true;
   if (graphics_.open_scopes().size() != outer_scopes + 1) {
     arguments.Error(Concat("the scopes of the imported file ", Quoted(path), " are not balanced"));

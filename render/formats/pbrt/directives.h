@@ -65,8 +65,9 @@ class DirectiveReader {
   static const Directive* FindDirective(std::string_view name);
 
   // Texts (directives.cc).
-  void IncludeFile(const std::string& path, const SourceLocation& location);
-  void ReadText(const std::string& path, std::string_view text);
+  // `including` (may be null): the text whose parameters may go on where the file ends.
+  void IncludeFile(const std::string& path, const SourceLocation& location, Tokenizer* including);
+  void ReadText(const std::string& path, std::string_view text, Tokenizer* including);
   void ReadDirectives(Tokenizer& tokens);
   // Stops where the text brings more than may be in memory, or more errors than anybody reads.
   void CheckRoom(const SourceLocation& location);
@@ -84,10 +85,13 @@ class DirectiveReader {
   bool RefusePbrtV3(const Arguments& arguments);
 
   // Transforms (transform_directives.cc).
-  bool Concatenate(Arguments& arguments, const StatusOr<Transform>& transform);
-  bool Replace(Arguments& arguments, const Transform& transform);
+  bool Concatenate(Arguments& arguments, const StatusOr<Transform>& transform,
+                   bool is_projective = false);
+  bool Replace(Arguments& arguments, const Transform& transform, bool is_projective = false);
   bool Replace(Arguments& arguments, const TransformPair& transforms);
-  bool ReadMatrix(Arguments& arguments, Transform& transform);
+  bool ReadMatrix(Arguments& arguments, Transform& transform, bool& is_projective);
+  // Reports an error where it does not.
+  bool StandsAffine(Arguments& arguments);
   bool OnIdentity(Arguments& arguments);
   bool OnTranslate(Arguments& arguments);
   bool OnScale(Arguments& arguments);
@@ -213,6 +217,7 @@ class DirectiveReader {
   TransformPair last_transforms_;
   std::map<std::string, TransformPair> coordinate_systems_;
   std::map<std::string, NamedMaterial> named_materials_;
+  std::vector<bool> materials_on_shapes_;  // of those that have shapes, by index
   std::map<std::string, NamedMedium> named_media_;
   MaterialNames defined_materials_;
   DeclaredTextures textures_;

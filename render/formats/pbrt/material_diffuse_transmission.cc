@@ -1,13 +1,33 @@
 // Material "diffusetransmission".
+#include <algorithm>
+#include <memory>
 #include <utility>
 
 #include "render/formats/pbrt/material_readers.h"
 
 namespace lucerna {
 
+namespace {
+
+float Held(float value) {
+  return std::min(value, 1.0F);
+}
+
+// No surface scatters more than falls in.
+void ScaleAndHold(float scale, Rgb& color, GivenSpectrum& spectrum) {
+  color = {Held(color.r * scale), Held(color.g * scale), Held(color.b * scale)};
+  if (!spectrum.is_given()) return;
+  WavelengthCurve curve = *spectrum.curve;
+  for (double& value : curve.value)
+    value = std::min(value * static_cast<double>(scale), 1.0);
+  spectrum.curve = std::make_shared<const WavelengthCurve>(std::move(curve));
+}
+
+}  // namespace
+
 void ReadDiffuseTransmission(const MaterialInput& input, Material& material) {
   ParameterList& parameters = input.parameters;
-  const float scale = static_cast<float>(parameters.Float("scale", 1, {0, 1}));
+  const float scale = static_cast<float>(parameters.Float("scale", 1, kZeroOrMore));
   material.texture_scale = scale;
   MaterialSpectra given;
   const auto read = [&](std::string_view name, Rgb& color, GivenSpectrum& spectrum,
@@ -15,8 +35,8 @@ void ReadDiffuseTransmission(const MaterialInput& input, Material& material) {
     if (parameters.IsTexture(name)) {
       texture = FindTexture(name, input);
     } else {
-      color = parameters.FindReflectance(name, &spectrum).value_or(Gray(0.25F)) * scale;
-      spectrum.factor = scale;
+      color = parameters.FindReflectance(name, &spectrum).value_or(Gray(0.25F));
+      ScaleAndHold(scale, color, spectrum);
     }
   };
   read("reflectance", material.reflectance, given.reflectance, material.texture);

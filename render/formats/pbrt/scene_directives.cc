@@ -53,9 +53,12 @@ bool DirectiveReader::OnCamera(Arguments& arguments) {
   std::string type;
   std::vector<Parameter> parameters;
   if (!arguments.ReadTyped(type, parameters)) return false;
-  if (unfinished_.has_camera) arguments.Error("the scene has a second camera");
-  unfinished_.has_camera = true;
   ParameterList list = ListFor(arguments, type, std::move(parameters));
+  if (unfinished_.has_camera) list.Warning("", "takes the place of the camera before it");
+  unfinished_.has_camera = true;
+  scene_.camera = {};
+  scene_.motion.of_camera.reset();
+  StandsAffine(arguments);
   ReadCamera(type, list, scene_.camera, scene_.motion);
   const TransformPair& from_world = graphics_.state().to_world;
   const StatusOr<Transform> at_start = from_world.start.Inverse();
@@ -251,6 +254,11 @@ bool DirectiveReader::OnLightSource(Arguments& arguments) {
   std::vector<std::size_t> before;
   ForEachDeltaList(scene_, [&](const auto& lights) { before.push_back(lights.size()); });
   WarnIfMoved(arguments, "lights do not move, in pbrt-v4 neither");
+  if (type != "infinite") {
+    StandsAffine(arguments);
+  } else if (graphics_.state().to_world.is_projective) {
+    list.Warning("", "has a transform that is not affine, of which it takes the upper three rows");
+  }
   ReadLight(type, list, graphics_.state().to_world.start, assets_, scene_);
   auto first = before.begin();
   ForEachDeltaList(scene_, [&](auto& lights) {
@@ -269,6 +277,10 @@ bool DirectiveReader::AddShape(Arguments& arguments, std::optional<TriangleMesh>
   std::vector<Parameter> parameters;
   if (!arguments.ReadTyped(type, parameters)) return false;
   GraphicsState& state = graphics_.state();
+  StandsAffine(arguments);
+  const auto material = static_cast<std::size_t>(state.material);
+  if (material >= materials_on_shapes_.size()) materials_on_shapes_.resize(material + 1);
+  materials_on_shapes_[material] = true;
   ParameterList list =
       ListFor(arguments, type, std::move(parameters), state.DefaultsOf(AttributeTarget::kShape));
   ShapePlacement placement = {
@@ -392,6 +404,7 @@ bool DirectiveReader::OnTexture(Arguments& arguments) {
   ParameterList list(arguments.SubjectOf(name), arguments.location(), std::move(parameters),
                      graphics_.state().DefaultsOf(AttributeTarget::kTexture).get(), diagnostics_);
   WarnIfMoved(arguments, "textures do not move, in pbrt-v4 neither");
+  StandsAffine(arguments);
   // Made first: a texture may not be a part of itself.
   NamedTexture made = ReadTexture(type, is_number, list, textures_,
                                   graphics_.state().to_world.start, assets_, scene_.textures);
@@ -438,6 +451,7 @@ bool DirectiveReader::OnMakeNamedMedium(Arguments& arguments) {
   NamedMedium& named = MediumCalled(name, arguments.location());
   if (named.is_defined) arguments.Error(Concat("the medium ", Quoted(name), " is defined twice"));
   named.is_defined = true;
+  StandsAffine(arguments);
   Medium medium = ReadMedium(list, graphics_.state().to_world.start);
   medium.name = name;
   scene_.media[static_cast<std::size_t>(named.index)] = std::move(medium);

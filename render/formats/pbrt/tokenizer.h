@@ -25,15 +25,18 @@ struct Token {
 
 class Tokenizer {
  public:
-  // `file`, `text` and `diagnostics` outlive the tokenizer.
-  Tokenizer(const std::string* file, std::string_view text, Diagnostics& diagnostics)
-      : file_(file), text_(text), diagnostics_(diagnostics) {}
+  // `file`, `text` and `diagnostics` outlive the tokenizer, and so does that of the text that
+  // includes this one (may be null).
+  Tokenizer(const std::string* file, std::string_view text, Diagnostics& diagnostics,
+            Tokenizer* including = nullptr)
+      : file_(file), text_(text), diagnostics_(diagnostics), including_(including) {}
 
   // The next token; kEnd again and again after the last one. A string that its line does not
   // close is an error, and ends with the line.
   Token Next();
   // What Next will return.
   const Token& Peek();
+  [[nodiscard]] Tokenizer* including() { return including_; }
 
  private:
   Token Scan();
@@ -45,6 +48,7 @@ class Tokenizer {
   const std::string* file_;
   std::string_view text_;
   Diagnostics& diagnostics_;
+  Tokenizer* const including_;
   std::size_t position_ = 0;
   std::size_t line_start_ = 0;
   int line_ = 1;

@@ -14,21 +14,26 @@ bool DirectiveReader::Replace(Arguments& arguments, const TransformPair& transfo
   return true;
 }
 
-bool DirectiveReader::Replace(Arguments& arguments, const Transform& transform) {
+bool DirectiveReader::Replace(Arguments& arguments, const Transform& transform,
+                              bool is_projective) {
   const GraphicsState& state = graphics_.state();
   TransformPair replaced = state.to_world;
+  const bool keeps_one = !state.changes_start || !state.changes_end;
+  replaced.is_projective = is_projective || (keeps_one && replaced.is_projective);
   if (state.changes_start) replaced.start = transform;
   if (state.changes_end) replaced.end = transform;
   return Replace(arguments, replaced);
 }
 
-bool DirectiveReader::Concatenate(Arguments& arguments, const StatusOr<Transform>& transform) {
+bool DirectiveReader::Concatenate(Arguments& arguments, const StatusOr<Transform>& transform,
+                                  bool is_projective) {
   if (!transform.ok()) {
     arguments.Error(std::string(transform.status().message()));
     return true;
   }
   const GraphicsState& state = graphics_.state();
   TransformPair joined = state.to_world;
+  joined.is_projective = joined.is_projective || is_projective;
   if (state.changes_start) joined.start = joined.start * *transform;
   if (state.changes_end) joined.end = joined.end * *transform;
   return Replace(arguments, joined);
@@ -61,30 +66,40 @@ bool DirectiveReader::OnLookAt(Arguments& arguments) {
                      Transform::LookAt({v[0], v[1], v[2]}, {v[3], v[4], v[5]}, {v[6], v[7], v[8]}));
 }
 
-bool DirectiveReader::ReadMatrix(Arguments& arguments, Transform& transform) {
+bool DirectiveReader::ReadMatrix(Arguments& arguments, Transform& transform, bool& is_projective) {
   std::array<double, 16> v{};
   if (!arguments.ReadNumbers(v)) return false;
   std::array<std::array<double, 4>, 4> rows{};
   for (std::size_t i = 0; i < 16; ++i)
     rows[i % 4][i / 4] = v[i];  // column by column
-  if (rows[3] != std::array<double, 4>{0, 0, 0, 1}) {
-    arguments.Error(Concat(arguments.directive(),
-                           " must be affine: its 4th, 8th, 12th and 16th numbers are 0, ",
-                           "0, 0 and 1"));
-    return true;
-  }
+  constexpr std::array<double, 4> kAffine = {0, 0, 0, 1};
+  is_projective = rows[3] != kAffine;
+  rows[3] = kAffine;
   transform = Transform(rows);
   return true;
 }
 
+bool DirectiveReader::StandsAffine(Arguments& arguments) {
+  if (!graphics_.state().to_world.is_projective) return true;
+  arguments.Error(Concat(arguments.directive(),
+                         " needs a transform that is affine: of the numbers of Transform and "
+                         "ConcatTransform before it the 4th, 8th, 12th and 16th must be 0, 0, 0 "
+                         "and 1"));
+  return false;
+}
+
 bool DirectiveReader::OnTransform(Arguments& arguments) {
-  Transform transform = graphics_.state().to_world.start;
-  return ReadMatrix(arguments, transform) && Replace(arguments, transform);
+  Transform transform;
+  bool is_projective = false;
+  return ReadMatrix(arguments, transform, is_projective) &&
+         Replace(arguments, transform, is_projective);
 }
 
 bool DirectiveReader::OnConcatTransform(Arguments& arguments) {
   Transform transform;
-  return ReadMatrix(arguments, transform) && Concatenate(arguments, transform);
+  bool is_projective = false;
+  return ReadMatrix(arguments, transform, is_projective) &&
+         Concatenate(arguments, transform, is_projective);
 }
 
 bool DirectiveReader::OnCoordinateSystem(Arguments& arguments) {
