@@ -300,9 +300,10 @@ bool DirectiveReader::AddShape(Arguments& arguments, std::optional<TriangleMesh>
     placement.traits.motion = MotionHere(arguments);
     placement.stays_similar = !state.to_world.Moves() || state.to_world.end.UniformScale().ok();
   }
-  ShapeSet shapes = mesh.has_value()
-                        ? PlaceMadeMesh(*std::move(mesh), list, placement, textures_.numbers)
-                        : ReadShapes(type, list, placement, textures_.numbers, assets_);
+  ShapeSet shapes =
+      mesh.has_value()
+          ? PlaceMadeMesh(*std::move(mesh), list, placement, textures_.numbers)
+          : ReadShapes(type, list, placement, {textures_.numbers, scene_.textures}, assets_);
   if (IsOfHair(scene_.materials, state.material) && !IsTubesAlone(shapes)) {
     list.Error("has the material hair, which is for curves of type flat or cylinder alone");
   }

@@ -59,11 +59,7 @@ void ReadLoopSubdivision(const ShapeInput& input, ShapeSet& shapes) {
   TriangleMesh control;
   if (!ReadPositions(parameters, 3, control)) return;
   const double triangles = std::ldexp(static_cast<double>(control.indices.size()) / 3, 2 * levels);
-  // While it is made: neighbours are looked up in tables.
-  constexpr std::uint64_t kBytesPerTriangle = 256;
-  constexpr double kMaxTriangles = 0x1p24;
-  const auto room = static_cast<double>(input.assets.limits().max_shape_bytes / kBytesPerTriangle);
-  if (triangles > std::min(kMaxTriangles, room)) {
+  if (triangles > static_cast<double>(MostTriangles(input.assets))) {
     parameters.Error("levels", Concat("splits it into ", triangles,
                                       " triangles, more than the memory for shapes holds"));
     return;

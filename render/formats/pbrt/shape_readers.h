@@ -28,7 +28,11 @@ struct ShapeInput {
   ParameterList& parameters;
   const ShapePlacement& placement;
   AssetReader& assets;
+  const ShapeTextures& textures;
 };
+
+// So many triangles may a shape be split into: while it is, neighbours are looked up in tables.
+[[nodiscard]] std::size_t MostTriangles(const AssetReader& assets);
 
 #define LUCERNA_DECLARE(Name, list, name)                     \
   void Read##Name(const ShapeInput& input, ShapeSet& shapes); \

@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "render/base/text.h"
+#include "render/formats/displaced_mesh.h"
 #include "render/formats/mesh_placement.h"
 #include "render/formats/pbrt/kinds.h"
 #include "render/formats/pbrt/shape_readers.h"
@@ -45,14 +46,38 @@ void ReadTriangleMesh(const ShapeInput& input, ShapeSet& shapes) {
     PlaceMesh(std::move(mesh), parameters, input.placement, shapes);
 }
 
+// False, and reported, where that cannot be done.
+bool DisplaceMesh(const ShapeInput& input, TriangleMesh& mesh) {
+  ParameterList& parameters = input.parameters;
+  const Transform& to_world = input.placement.to_world;
+  const double edge_length = parameters.Float("edgelength", 1, kAboveZero);
+  HeightOf height;
+  if (parameters.IsTexture("displacement")) {
+    const NamedTexture* texture = FindNumbers("displacement", parameters, input.textures.numbers);
+    if (texture == nullptr) return false;
+    height = [&to_world, number = texture->number, all = input.textures.all](Vec3 position, Vec2 uv,
+                                                                             Vec3 normal) {
+      return static_cast<double>(
+          TextureNumber(all, number, {uv, to_world.Point(position), to_world.Normal(normal)}));
+    };
+  } else {
+    height = [everywhere = parameters.Float("displacement", 0)](Vec3, Vec2, Vec3) {
+      return everywhere;
+    };
+  }
+  if (mesh.uvs.empty()) {
+    parameters.Error("displacement", "needs a mesh with texture coordinates");
+    return false;
+  }
+  const Status displaced =
+      Displace(edge_length, to_world, MostTriangles(input.assets), height, mesh);
+  if (!displaced.ok()) parameters.Error("displacement", std::string(displaced.message()));
+  return displaced.ok();
+}
+
 void ReadPlyMesh(const ShapeInput& input, ShapeSet& shapes) {
   ParameterList& parameters = input.parameters;
   const std::optional<std::string> file = parameters.FindString("filename");
-  if (parameters.Has("displacement")) {
-    parameters.Error("displacement", "is not supported");
-    parameters.Ignore("displacement");
-  }
-  parameters.Ignore("edgelength");
   if (!file.has_value()) {
     if (!parameters.Has("filename")) parameters.Error("needs \"string filename\"");
     return;
@@ -60,6 +85,11 @@ void ReadPlyMesh(const ShapeInput& input, ShapeSet& shapes) {
   StatusOr<TriangleMesh> mesh = input.assets.ReadMesh(*file);
   if (!mesh.ok()) {
     parameters.Error("filename", Concat("cannot be read: ", mesh.status().message()));
+    return;
+  }
+  if (!parameters.Has("displacement")) {
+    parameters.Ignore("edgelength");
+  } else if (!DisplaceMesh(input, *mesh)) {
     return;
   }
   PlaceMesh(*std::move(mesh), parameters, input.placement, shapes);
@@ -171,6 +201,12 @@ bool ReadUvs(ParameterList& parameters, TriangleMesh& mesh) {
   return false;
 }
 
+std::size_t MostTriangles(const AssetReader& assets) {
+  constexpr std::size_t kBytesPerTriangle = 256;
+  constexpr std::size_t kMost = std::size_t{1} << 24;
+  return std::min<std::size_t>(kMost, assets.limits().max_shape_bytes / kBytesPerTriangle);
+}
+
 bool IsFlattened(ParameterList& parameters, const Transform& to_world) {
   if (to_world.Inverse().ok()) return false;
   parameters.diagnostics().Note(
@@ -222,7 +258,7 @@ double ShapeSet::Area() const {
 }
 
 ShapeSet ReadShapes(std::string_view type, ParameterList& parameters,
-                    const ShapePlacement& placement, const TextureNames& numbers,
+                    const ShapePlacement& placement, const ShapeTextures& textures,
                     AssetReader& assets) {
   ShapeSet shapes;
   const ShapeReader read = FindReader<ShapeReader>(kKinds, type);
@@ -231,8 +267,8 @@ ShapeSet ReadShapes(std::string_view type, ParameterList& parameters,
     return shapes;
   }
   ShapePlacement with_alpha = placement;
-  ReadAlpha(parameters, numbers, placement.emits, with_alpha.traits);
-  read({parameters, with_alpha, assets}, shapes);
+  ReadAlpha(parameters, textures.numbers, placement.emits, with_alpha.traits);
+  read({parameters, with_alpha, assets, textures}, shapes);
   parameters.WarnOfUnread();
   return shapes;
 }

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <string_view>
 #include <vector>
 
@@ -44,8 +45,14 @@ struct ShapePlacement {
   bool stays_similar = true;
 };
 
+// What float textures are called, and all textures so far.
+struct ShapeTextures {
+  const TextureNames& numbers;
+  std::span<const Texture> all;
+};
+
 [[nodiscard]] ShapeSet ReadShapes(std::string_view type, ParameterList& parameters,
-                                  const ShapePlacement& placement, const TextureNames& numbers,
+                                  const ShapePlacement& placement, const ShapeTextures& textures,
                                   AssetReader& assets);
 
 // The same of a mesh that was read otherwise, with sound indices, in the shape's own space.
