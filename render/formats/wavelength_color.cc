@@ -61,6 +61,16 @@ WavelengthCurve BlackbodyCurve(double temperature_k) {
   return curve;
 }
 
+double LuminanceOf(const WavelengthCurve& curve) {
+  return Observe([&curve](double nm) { return curve.At(nm); })[1] /
+         Observe([](double /*nm*/) { return 1.0; })[1];
+}
+
+double BlackbodyPeak(double temperature_k) {
+  constexpr double kWienNmK = 2.897772e6;
+  return Planck(kWienNmK / temperature_k, temperature_k);
+}
+
 Rgb ReflectanceColor(const WavelengthCurve& curve) {
   const auto lit = Rec709(Observe([&curve](double nm) { return curve.At(nm) * D65At(nm); }));
   const auto white = Rec709(Observe(D65At));

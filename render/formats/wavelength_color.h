@@ -24,6 +24,11 @@ inline constexpr double kMinBlackbodyK = 500, kMaxBlackbodyK = 1e6;
 // The same up to a factor, where the eye sees.
 [[nodiscard]] WavelengthCurve BlackbodyCurve(double temperature_k);
 
+// The luminance of light with this curve, where light of value 1 at all wavelengths has 1.
+[[nodiscard]] double LuminanceOf(const WavelengthCurve& curve);
+// The largest value of BlackbodyCurve's law at any wavelength, by Wien's displacement law.
+[[nodiscard]] double BlackbodyPeak(double temperature_k);
+
 // A surface that reflects by this curve, in daylight D65; a curve that is 1 everywhere is white.
 // Every channel is in [0, 1].
 [[nodiscard]] Rgb ReflectanceColor(const WavelengthCurve& curve);

@@ -73,9 +73,20 @@ struct CoatTable {
   std::vector<float> again;
   float meetings_again = 0;
   // What a metal makes of the residual of each direction, [kCosines], of the same layers: the share
-  // that has met it once, the share of the rest that meets it once more each time, and the mean of
-  // (1 - c)³ over the cosines c of all meetings.
-  std::vector<float> met_once, goes_on, slant;
+  // that has met it once, and the share of the rest that meets it once more each time.
+  std::vector<float> met_once, goes_on;
+
+  // A metal's reflectance over the cosines of its facets is followed by the polynomial of degree 4
+  // through its values at these (Chebyshev's) and at 0, where it is 1. So its mean over any
+  // distribution of cosines is a sum of the values, with weights that are means of Lagrange's
+  // polynomials, the same for all metals.
+  static constexpr std::array<float, 4> kMetalCosines = {1.0F, 0.8535534F, 0.5F, 0.1464466F};
+  using CosineWeights = std::array<float, kMetalCosines.size()>;
+  // [kCosines] over all meetings of the residual of each direction.
+  std::vector<CosineWeights> residual_cosines;
+  // [kCosines], or empty under a smooth coat: what the facets of a rough one add to the weights of
+  // light that meets the metal once, from each of its two directions.
+  std::vector<CosineWeights> once_cosines;
 };
 
 // The tables of a coated material with a texture of its roughness or thickness. They differ in one

@@ -1,5 +1,6 @@
 // A metal under a dielectric coat, on both sides of a surface. Equations as in transport/coat.h.
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "render/math/color_space.h"
@@ -39,16 +40,39 @@ Rgb HazeColor(const Material& material) {
   return sum + CoatShareOfHits(material, 0);
 }
 
-// The same for light from a direction at `cosine`.
-Rgb ResidualColor(const Material& material, float cosine) {
-  if (material.HasHaze()) return HazeColor(material);
+// What the metal absorbs at CoatTable::kMetalCosines.
+using Absorbed = std::array<Rgb, CoatTable::kMetalCosines.size()>;
+Absorbed AbsorbedAtCosines(const Material& material) {
+  Absorbed absorbed;
+  for (std::size_t i = 0; i < absorbed.size(); ++i)
+    absorbed[i] = Gray(1) - MetalInCoat(material, CoatTable::kMetalCosines[i]);
+  return absorbed;
+}
+
+// A mean over cosines; where these are added to others, of what is added.
+Rgb MeanOf(const Absorbed& absorbed, const CoatTable::CosineWeights& weights) {
+  Rgb mean;
+  for (std::size_t i = 0; i < absorbed.size(); ++i)
+    mean += absorbed[i] * weights[i];
+  return mean;
+}
+
+Rgb HeldInUnit(Rgb color) {
+  return {std::clamp(color.r, 0.0F, 1.0F), std::clamp(color.g, 0.0F, 1.0F),
+          std::clamp(color.b, 0.0F, 1.0F)};
+}
+
+// What is left of light that meets a metal as `meetings` says, one reflectance for all of them.
+float LeftOf(const CoatMeetings& meetings, float reflectance) {
+  const float more = reflectance * (1 - meetings.goes_on) / (1 - meetings.goes_on * reflectance);
+  return reflectance * (meetings.once + (1 - meetings.once) * more);
+}
+
+// HazeColor of a layer that does not scatter, for light from a direction at `cosine`.
+Rgb ResidualColor(const Material& material, const Absorbed& absorbed, float cosine) {
   const CoatMeetings meetings = CoatMeetingsOf(material, cosine);
-  const Rgb metal = MetalInCoat(material, meetings.cosine);
-  const auto of = [&](float reflectance) {
-    const float more = reflectance * (1 - meetings.goes_on) / (1 - meetings.goes_on * reflectance);
-    return reflectance * (meetings.once + (1 - meetings.once) * more);
-  };
-  return {of(metal.r), of(metal.g), of(metal.b)};
+  const Rgb metal = HeldInUnit(Gray(1) - MeanOf(absorbed, meetings.cosines));
+  return {LeftOf(meetings, metal.r), LeftOf(meetings, metal.g), LeftOf(meetings, metal.b)};
 }
 
 // A smooth coat over a smooth metal: the sum over all orders, all in one direction.
@@ -86,7 +110,9 @@ Lobes LobesOf(const Material& material, Vec3 up) {
     lobes.coat = std::max(kLeastShare, FresnelDielectric(up.z, material.ior, cos_t));
   }
   lobes.base = std::max(kLeastShare, metal * CoatEntering(material, up));
-  lobes.residual = MaxChannel(CoatResidual(material, up.z) * ResidualColor(material, up.z));
+  const Rgb residual = CoatResidual(material, up.z);
+  lobes.residual = material.HasHaze() ? MaxChannel(residual * HazeColor(material))
+                                      : residual.g * LeftOf(CoatMeetingsOf(material, up.z), metal);
   const float sum = lobes.coat + lobes.base + lobes.residual;
   return {lobes.coat / sum, lobes.base / sum, lobes.residual / sum};
 }
@@ -137,12 +163,19 @@ Rgb EvaluateUp(const Material& material, Vec3 up, Vec3 wi) {
       Half(up_in, wi_in, m)) {
     const Ggx ggx = BaseFacets(material);
     const float jacobian = 1 / (4 * up_in.z * wi_in.z * Square(material.ior));
-    below = MetalInCoat(material, Dot(up_in, m)) *
-            (ggx.D(m) * ggx.G2(up_in, wi_in) * jacobian * CoatEntering(material, up) *
-             CoatEntering(material, wi));
+    const Absorbed absorbed = AbsorbedAtCosines(material);
+    Rgb metal = MetalInCoat(material, Dot(up_in, m));
+    if (!HasNoFacets(material)) {
+      metal = HeldInUnit(metal - MeanOf(absorbed, CoatOnceCosines(material, up.z)) -
+                         MeanOf(absorbed, CoatOnceCosines(material, wi.z)));
+    }
+    below = metal * (ggx.D(m) * ggx.G2(up_in, wi_in) * jacobian * CoatEntering(material, up) *
+                     CoatEntering(material, wi));
     if (!material.HasHaze()) {
       const Ggx again = AgainFacets(material);
-      const Rgb color = (ResidualColor(material, up.z) + ResidualColor(material, wi.z)) * 0.5F;
+      const Rgb color =
+          (ResidualColor(material, absorbed, up.z) + ResidualColor(material, absorbed, wi.z)) *
+          0.5F;
       below += color * (again.D(m) * again.G2(up_in, wi_in) * jacobian * CoatAgain(material, up.z) *
                         CoatAgain(material, wi.z));
     }

@@ -48,6 +48,21 @@ float AtCosine(const std::vector<float>& table, std::size_t row, float cosine) {
   return node[0] * (1 - share) + node[1] * share;
 }
 
+CoatTable::CosineWeights ReadWeights(const Material& material,
+                                     std::vector<CoatTable::CosineWeights> CoatTable::*column,
+                                     float cosine) {
+  const auto [below, share] = CoatTable::PlaceOf(cosine);
+  CoatTable::CosineWeights weights = {};
+  for (std::size_t i = 0; i < weights.size(); ++i) {
+    weights[i] = ReadTable(material, [&, below = below, share = share](const CoatTable& table) {
+      if ((table.*column).empty()) return 0.0F;
+      const CoatTable::CosineWeights* const node = &(table.*column)[below];
+      return node[0][i] * (1 - share) + node[1][i] * share;
+    });
+  }
+  return weights;
+}
+
 float EnteringIn(const CoatTable& table, Vec3 w) {
   const auto [below, share] = CoatTable::PlaceOf(w.z);
   const auto at = [&, below = below, share = share](int row) {
@@ -114,7 +129,12 @@ CoatMeetings CoatMeetingsOf(const Material& material, float cosine) {
     return ReadTable(material,
                      [&](const CoatTable& table) { return AtCosine(table.*column, 0, cosine); });
   };
-  return {at(&CoatTable::met_once), at(&CoatTable::goes_on), 1 - std::cbrt(at(&CoatTable::slant))};
+  return {at(&CoatTable::met_once), at(&CoatTable::goes_on),
+          ReadWeights(material, &CoatTable::residual_cosines, cosine)};
+}
+
+CoatTable::CosineWeights CoatOnceCosines(const Material& material, float cosine) {
+  return ReadWeights(material, &CoatTable::once_cosines, cosine);
 }
 
 float CoatWidening(const Material& material) {

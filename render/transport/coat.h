@@ -17,12 +17,14 @@
 //     f(wo, wi) = E(wo) · E(wi) / ior² · f_m(wo', wi') + C · A(wo) · A(wi) / ior² · f_a(wo', wi')
 //
 // Under a smooth coat the first term is exact, and under a rough one its facets widen f_m
-// (BaseWidthSeen), by as much as a fit to a random walk says. The second is light that meets the
-// metal more than once: f_a is of facets that are wider by as many more meetings of metal and coat,
-// squares of widths added up. C is a sum of powers of the metal's reflectance, the mean of one of
-// either direction, and A makes the flux M, which is what the first term leaves out of that of a
-// random walk through coat and metal, for a metal that reflects all: the flux is that of the walk,
-// the directions are about those.
+// (BaseWidthSeen), by as much as a fit to a random walk says. Light that its facets turn meets the
+// metal more slanted than light that is refracted at the mean surface; what such a metal reflects
+// more is added to its reflectance at the half vector, a sum of a number of each direction. The
+// second is light that meets the metal more than once: f_a is of facets that are wider by as many
+// more meetings of metal and coat, squares of widths added up. C is a sum of powers of the metal's
+// reflectance, the mean of one of either direction, and A makes the flux M, which is what the first
+// term leaves out of that of a random walk through coat and metal, for a metal that reflects all:
+// the flux is that of the walk, the directions are about those.
 //
 // Where the layer scatters (haze), E and K contain what was scattered and came to the base, and a
 // third term B(wo) · B(wi) / (π · B̄) is what leaves without having met it; over a metal M contains
@@ -76,9 +78,11 @@ void FitCoat(MaterialNumbers& material);
 // What a metal makes of that term, of light from a direction at `cosine` outside: CoatTable.
 struct CoatMeetings {
   float once = 0, goes_on = 0;
-  float cosine = 1;  // of a meeting: its (1 - c)³ is the mean over all
+  CoatTable::CosineWeights cosines = {};
 };
 [[nodiscard]] CoatMeetings CoatMeetingsOf(const Material& material, float cosine);
+// CoatTable::once_cosines, zeros under a smooth coat.
+[[nodiscard]] CoatTable::CosineWeights CoatOnceCosines(const Material& material, float cosine);
 // CoatTable::widening, of a prepared material.
 [[nodiscard]] float CoatWidening(const Material& material);
 // Facets of f_m, and of f_a.

@@ -208,15 +208,29 @@ using WalkedShares = std::vector<std::array<double, CoatTable::kHits + 1>>;
 // What light of a metal of medium reflectance weighs that has met it so often.
 constexpr double kMediumReflectance = 0.6;
 
-// The mean of (1 - c)³ over meetings.
-struct MeanSlant {
-  double sum = 0, meetings = 0;
+// Sums of cosines of the metal's facets, and of what they are weighted by.
+struct MeanCosines {
+  CosineSums sums{};
+  double weight = 0;
+
+  [[nodiscard]] CoatTable::CosineWeights Mean() const {
+    CoatTable::CosineWeights mean = {};
+    if (!(weight > 0)) return mean;
+    for (std::size_t i = 0; i < mean.size(); ++i)
+      mean[i] = static_cast<float>(sums[i] / weight);
+    return mean;
+  }
+};
+
+// Of light that leaves after its first meeting with the metal, and of all that does later.
+struct NodeCosines {
+  MeanCosines once, more;
 };
 
 // Adds the shares of flux at a node that leave coat and metal after 0, 1, 2, ... meetings. Returns
 // the events in a layer that scatters.
 int AddWalk(const MaterialNumbers& material, int walk, int node, WalkedShares& shares,
-            MeanSlant& slant) {
+            NodeCosines& cosines) {
   MetalWalk metal_walk(material, CoatTable::CosineOf(node), WalkNumbers(walk, node));
   const auto place = [](int meetings) {
     return static_cast<std::size_t>(std::min(meetings, CoatTable::kHits));
@@ -229,17 +243,17 @@ int AddWalk(const MaterialNumbers& material, int walk, int node, WalkedShares& s
   }
   metal_walk.Through(material.base_hits, [&](int meetings, double flux, Vec3 /*out*/) {
     shares[0][place(meetings)] += flux;
-    if (meetings < 2) return;
+    MeanCosines& mean = meetings < 2 ? cosines.once : cosines.more;
     const double weight = flux * std::pow(kMediumReflectance, meetings);
-    slant.sum += weight * static_cast<double>(metal_walk.slant());
-    slant.meetings += weight * meetings;
+    Add(metal_walk.cosines(), weight, mean.sums);
+    mean.weight += weight * meetings;
   });
   return 0;
 }
 
-// The mean of visit(direction outside, share of flux, share of the mean) over the directions in
-// which light from `w` leaves that has met a metal of these facets once, 0 where none does. The
-// metal reflects all, and so lets the coat's surface through.
+// The mean of visit(direction outside, share of flux, share of the mean, cosine at the facet) over
+// the directions in which light from `w` leaves that has met a metal of these facets once, 0 where
+// none does. The metal reflects all, and so lets the coat's surface through.
 template <typename Visit>
 float MeanOverReflected(const Material& material, Vec3 w, const Ggx& facets, const Visit& visit) {
   Vec3 inside;
@@ -251,7 +265,8 @@ float MeanOverReflected(const Material& material, Vec3 w, const Ggx& facets, con
     const float y = up.y * material.ior;
     const float squared = 1 - x * x - y * y;
     if (!(up.z > 0) || !(squared > 0)) return 0.0F;
-    return visit(Vec3{x, y, std::sqrt(squared)}, facets.G2(inside, up) / visible, share);
+    return visit(Vec3{x, y, std::sqrt(squared)}, facets.G2(inside, up) / visible, share,
+                 Dot(inside, m));
   });
 }
 
@@ -300,11 +315,12 @@ float FittedWidening(const Material& material) {
       add(met, 1, of_walks);
     Mean of_lobe;
     const Ggx facets(static_cast<float>(std::sqrt(u2)), static_cast<float>(std::sqrt(v2)));
-    MeanOverReflected(material, {0, 0, 1}, facets, [&](Vec3 out, float flux, float share) {
-      add(met_with(out, static_cast<double>(flux * CoatEntering(material, out))),
-          static_cast<double>(share), of_lobe);
-      return flux;
-    });
+    MeanOverReflected(material, {0, 0, 1}, facets,
+                      [&](Vec3 out, float flux, float share, float /*cosine*/) {
+                        add(met_with(out, static_cast<double>(flux * CoatEntering(material, out))),
+                            static_cast<double>(share), of_lobe);
+                        return flux;
+                      });
     return of_walks.sum * of_lobe.flux > of_lobe.sum * of_walks.flux;
   };
   double low = kLeastWidening;
@@ -334,18 +350,31 @@ void ForEachTurn(const Material& material, float cosine, const Visit& visit) {
 // [kCosines × kCosines] of the flux from one node, what leaves at each after one meeting with a
 // metal of these facets that reflects all, and so lets the coat's surface through. Over azimuths an
 // average.
-std::vector<double> ReflectedBetweenNodes(const Material& material, const Ggx& facets) {
+struct Between {
+  std::vector<double> flux;
+  std::vector<CosineSums>
+      cosines;  // [kCosines × kCosines] or empty: of the metal's facets, times flux
+};
+Between ReflectedBetweenNodes(const Material& material, const Ggx& facets, bool has_cosines) {
   constexpr std::size_t kCosines = CoatTable::kCosines;
-  std::vector<double> reflected(kCosines * kCosines);
+  Between reflected;
+  reflected.flux.resize(kCosines * kCosines);
+  if (has_cosines) reflected.cosines.resize(kCosines * kCosines);
   const double of_turn = 1.0 / TurnsOf(material);
   for (std::size_t i = 1; i < kCosines; ++i) {
-    double* to = &reflected[i * kCosines];
     ForEachTurn(material, CoatTable::CosineOf(static_cast<int>(i)), [&](Vec3 w) {
-      MeanOverReflected(material, w, facets, [&](Vec3 out, float flux, float share) {
+      MeanOverReflected(material, w, facets, [&](Vec3 out, float flux, float share, float cosine) {
         const CoatTable::Place node = CoatTable::PlaceOf(out.z);
         const double leaving = of_turn * static_cast<double>(flux * share);
-        to[node.below] += leaving * static_cast<double>(1 - node.share);
-        to[node.below + 1] += leaving * static_cast<double>(node.share);
+        const std::size_t below = i * kCosines + node.below;
+        const double above = leaving * static_cast<double>(node.share);
+        reflected.flux[below] += leaving - above;
+        reflected.flux[below + 1] += above;
+        if (has_cosines) {
+          const CosineSums at_facet = LagrangeAt(std::max(0.0F, cosine));
+          Add(at_facet, leaving - above, reflected.cosines[below]);
+          Add(at_facet, above, reflected.cosines[below + 1]);
+        }
         return flux;
       });
     });
@@ -360,8 +389,9 @@ double MeanMetOnce(const Material& material, float cosine) {
   double sum = 0;
   ForEachTurn(material, cosine, [&](Vec3 w) {
     const float mean = MeanOverReflected(
-        material, w, facets,
-        [&](Vec3 out, float flux, float /*share*/) { return CoatEntering(material, out) * flux; });
+        material, w, facets, [&](Vec3 out, float flux, float /*share*/, float /*cosine*/) {
+          return CoatEntering(material, out) * flux;
+        });
     sum += static_cast<double>(CoatEntering(material, w) * mean);
   });
   return sum / TurnsOf(material);
@@ -369,7 +399,7 @@ double MeanMetOnce(const Material& material, float cosine) {
 
 // What a metal makes of the residual at a node: shares by meetings, of which those after the first
 // become a geometric series, equal to them at a medium reflectance.
-void AddMeetings(const std::array<double, CoatTable::kHits + 1>& shares, const MeanSlant& slant,
+void AddMeetings(const std::array<double, CoatTable::kHits + 1>& shares, const NodeCosines& cosines,
                  std::size_t node, CoatTable& table) {
   double more = 0;
   double left = 0;  // of `more`, at a medium reflectance, once at least
@@ -382,7 +412,49 @@ void AddMeetings(const std::array<double, CoatTable::kHits + 1>& shares, const M
   const double share = more > 0 ? left / more : 1;
   table.met_once[node] = all > 0 ? static_cast<float>(shares[1] / all) : 0.0F;
   table.goes_on[node] = static_cast<float>((1 - share) / (1 - kMediumReflectance * share));
-  table.slant[node] = slant.meetings > 0 ? static_cast<float>(slant.sum / slant.meetings) : 0.0F;
+  table.residual_cosines[node] = cosines.more.Mean();
+}
+
+// Fills CoatTable::once_cosines: numbers of the two directions, d(w) + d(w'), whose mean over what
+// the first term brings of each direction is what the walks' mean differs by from the lobe's.
+void AddOnce(const Between& reflected, const std::vector<NodeCosines>& walked, CoatTable& table) {
+  constexpr std::size_t kCosines = CoatTable::kCosines;
+  constexpr int kRounds = 64;
+  // Over azimuths an average.
+  std::vector<double> entering(kCosines);
+  for (std::size_t at = 0; at < table.entering.size(); ++at)
+    entering[at % kCosines] += static_cast<double>(table.entering[at]);
+  std::vector<CosineSums> missing(kCosines);
+  std::vector<double> all(kCosines);
+  for (std::size_t i = 1; i < kCosines; ++i) {
+    CosineSums lobe{};
+    for (std::size_t j = 0; j < kCosines; ++j) {
+      all[i] += reflected.flux[i * kCosines + j] * entering[j];
+      Add(reflected.cosines[i * kCosines + j], entering[j], lobe);
+    }
+    if (!(all[i] > 0) || !(walked[i].once.weight > 0)) continue;
+    Add(walked[i].once.sums, 1 / walked[i].once.weight, missing[i]);
+    Add(lobe, -1 / all[i], missing[i]);
+  }
+  std::vector<CosineSums> found(kCosines);
+  for (int round = 0; round < kRounds; ++round) {
+    std::vector<CosineSums> next = found;
+    for (std::size_t i = 1; i < kCosines; ++i) {
+      if (!(all[i] > 0)) continue;
+      CosineSums rest = missing[i];
+      Add(found[i], -1, rest);
+      for (std::size_t j = 1; j < kCosines; ++j)
+        Add(found[j], -reflected.flux[i * kCosines + j] * entering[j] / all[i], rest);
+      Add(rest, 0.5, next[i]);
+    }
+    found = std::move(next);
+  }
+  table.once_cosines.resize(kCosines);
+  for (std::size_t i = 1; i < kCosines; ++i) {
+    for (std::size_t k = 0; k < found[i].size(); ++k)
+      table.once_cosines[i][k] = static_cast<float>(found[i][k]);
+  }
+  table.once_cosines[0] = table.once_cosines[1];
 }
 
 // Requires a material with a table for its coat alone, to which the rest is added.
@@ -390,13 +462,13 @@ void AddResidual(const Material& material, CoatTable& table) {
   constexpr std::size_t kCosines = CoatTable::kCosines;
   const std::size_t albedos = material.HasHaze() ? CoatTable::kAlbedos : 1;
   std::vector<WalkedShares> walked(kCosines, WalkedShares(albedos));
-  std::vector<MeanSlant> slants(kCosines);
+  std::vector<NodeCosines> cosines(kCosines);
   for (int i = 1; i < CoatTable::kCosines; ++i) {
     WalkedShares& here = walked[static_cast<std::size_t>(i)];
     int walks = 0;
     std::int64_t events = 0;
     for (; walks < kCoatWalks && events < kEventsOfNode; ++walks) {
-      events += AddWalk(material, walks, i, here, slants[static_cast<std::size_t>(i)]);
+      events += AddWalk(material, walks, i, here, cosines[static_cast<std::size_t>(i)]);
     }
     for (auto& row : here) {
       for (double& share : row)
@@ -408,14 +480,15 @@ void AddResidual(const Material& material, CoatTable& table) {
   // that of the walk. Half of the error goes to each of its two occurrences.
   // Where E is the same for all azimuths, sums over nodes are the averages over facets.
   const bool has_nodes = table.rows == 1 && !table.entering.empty();
-  std::vector<double> reflected;
-  if (has_nodes) reflected = ReflectedBetweenNodes(material, BaseFacets(material));
+  Between reflected;
+  if (!HasNoFacets(material))
+    reflected = ReflectedBetweenNodes(material, BaseFacets(material), !material.HasHaze());
   const auto met_once = [&](int i) {
     if (!has_nodes) return MeanMetOnce(material, CoatTable::CosineOf(i));
     const auto node = static_cast<std::size_t>(i);
     double sum = 0;
     for (std::size_t j = 0; j < kCosines; ++j)
-      sum += reflected[node * kCosines + j] * static_cast<double>(table.entering[j]);
+      sum += reflected.flux[node * kCosines + j] * static_cast<double>(table.entering[j]);
     return static_cast<double>(table.entering[node]) * sum;
   };
   for (int round = 0; round < kScalings && !table.entering.empty(); ++round) {
@@ -430,6 +503,7 @@ void AddResidual(const Material& material, CoatTable& table) {
     }
     table.entering = std::move(scaled);
   }
+  if (!reflected.cosines.empty()) AddOnce(reflected, cosines, table);
   table.residual.assign(albedos * kCosines, 0.0F);
   for (std::size_t row = 0; row < albedos; ++row) {
     std::array<double, CoatTable::kHits + 1> by_hits = {};
@@ -449,13 +523,15 @@ void AddResidual(const Material& material, CoatTable& table) {
       sum += WeightOfNode(i) * residual;
     }
     if (!material.HasHaze()) {
-      for (std::vector<float>* const column : {&table.met_once, &table.goes_on, &table.slant})
+      for (std::vector<float>* const column : {&table.met_once, &table.goes_on})
         column->resize(kCosines);
+      table.residual_cosines.resize(kCosines);
       for (std::size_t node = 1; node < kCosines; ++node)
-        AddMeetings(walked[node][row], slants[node], node, table);
+        AddMeetings(walked[node][row], cosines[node], node, table);
       // No light falls in along the surface.
-      for (std::vector<float>* const column : {&table.met_once, &table.goes_on, &table.slant})
+      for (std::vector<float>* const column : {&table.met_once, &table.goes_on})
         column->front() = (*column)[1];
+      table.residual_cosines[0] = table.residual_cosines[1];
     }
     table.mean_residual.push_back(static_cast<float>(sum));
     CoatTable::ByHits& shares = table.by_hits.emplace_back();
@@ -470,7 +546,8 @@ void AddAgain(const Material& material, CoatTable& table) {
   const CoatTable::ByHits& shares = table.by_hits[0];
   for (std::size_t hit = 2; hit < shares.size(); ++hit)
     table.meetings_again += static_cast<float>(hit - 1) * shares[hit];
-  const std::vector<double> reflected = ReflectedBetweenNodes(material, AgainFacets(material));
+  const std::vector<double> reflected =
+      ReflectedBetweenNodes(material, AgainFacets(material), /*has_cosines=*/false).flux;
   // Half of each error goes to each of the two occurrences of a factor.
   constexpr int kRounds = 64;
   std::vector<double> again(kCosines);

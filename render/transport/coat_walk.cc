@@ -14,6 +14,26 @@ constexpr std::uint64_t kKey = 0x434f4154ULL;
 
 }  // namespace
 
+CosineSums LagrangeAt(float cosine) {
+  const auto at = static_cast<double>(cosine);
+  CosineSums values;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const auto own = static_cast<double>(CoatTable::kMetalCosines[i]);
+    double value = at / own;  // of the node 0
+    for (std::size_t j = 0; j < values.size(); ++j) {
+      const auto other = static_cast<double>(CoatTable::kMetalCosines[j]);
+      if (j != i) value *= (at - other) / (own - other);
+    }
+    values[i] = value;
+  }
+  return values;
+}
+
+void Add(const CosineSums& sums, double factor, CosineSums& to) {
+  for (std::size_t i = 0; i < sums.size(); ++i)
+    to[i] += factor * sums[i];
+}
+
 Vec3 DirectionAt(float cosine, float azimuth) {
   const float sine = std::sqrt(std::max(0.0F, 1 - cosine * cosine));
   return {sine * std::cos(azimuth), sine * std::sin(azimuth), cosine};
@@ -105,8 +125,7 @@ bool MetalWalk::Reflect(Vec3 from, Vec3& up, float& factor) {
     if (!(up.z > 0)) return false;
     factor = metal_.G2(from, up) / metal_.G1(from);
   }
-  const float off = 1 - std::clamp(Dot(from, facet), 0.0F, 1.0F);
-  slant_ += off * off * off;
+  Add(LagrangeAt(std::clamp(Dot(from, facet), 0.0F, 1.0F)), 1, cosines_);
   return true;
 }
 

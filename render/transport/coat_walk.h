@@ -134,6 +134,11 @@ class WalkNumbers {
   KeyedRng rng_;
 };
 
+// Of CoatTable::kMetalCosines, and 0: Lagrange's polynomials, that of 0 left out.
+using CosineSums = std::array<double, CoatTable::kMetalCosines.size()>;
+[[nodiscard]] CosineSums LagrangeAt(float cosine);
+void Add(const CosineSums& sums, double factor, CosineSums& to);
+
 // A walk from a direction at `cosine` outside through a coat to a metal that reflects all.
 class MetalWalk {
  public:
@@ -162,8 +167,8 @@ class MetalWalk {
       down = crossed.back;
     }
   }
-  // The sum over the meetings so far of (1 - c)³, c the cosine at the facet.
-  [[nodiscard]] float slant() const { return slant_; }
+  // Sums over the meetings so far of Lagrange's polynomials at the cosine of the facet.
+  [[nodiscard]] const CosineSums& cosines() const { return cosines_; }
   // Through one that scatters: visit(meetings, share of flux, weights). Returns the events.
   template <typename Visit>
   int ThroughHaze(const Visit& visit) {
@@ -191,7 +196,7 @@ class MetalWalk {
   WalkNumbers numbers_;
   Ggx metal_;
   Crossed first_;
-  float slant_ = 0;
+  CosineSums cosines_{};
 };
 
 }  // namespace lucerna

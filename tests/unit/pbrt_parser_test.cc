@@ -470,6 +470,36 @@ TEST(PbrtParserTest, ColoursByTemperatureAndWavelengthHaveLuminanceOne) {
 
 // ---- scopes, files
 
+// pbrt-v4 makes a picture of such a light, and a picture has the unit of its file: a black body is
+// 1 where it is brightest, at any wavelength.
+TEST(PbrtParserTest, BehindAPortalColoursByTemperatureAndWavelengthKeepTheirUnit) {
+  const auto luminance = [](const std::string& parameters) {
+    const Scene scene = ReadWorld("LightSource \"infinite\" " + parameters);
+    return static_cast<double>(Luminance(scene.infinite_lights.at(0).radiance));
+  };
+  const std::string portal = " \"point3 portal\" [0 0 0  0 1 0  1 1 0  1 0 0] \"float scale\" 3";
+  EXPECT_NEAR(luminance("\"spectrum L\" [300 2 900 2]" + portal), 6, 1e-4);
+  EXPECT_NEAR(luminance("\"spectrum L\" [300 2 900 2]"), 1, 1e-4);
+  EXPECT_NEAR(luminance("\"rgb L\" [2 2 2]" + portal), 6, 1e-4);
+  for (const double temperature_k : {2500.0, 6500.0}) {
+    // h c / (k T) in nm.
+    const double unit_nm = 6.62607015e-34 * 299792458 / (1.380649e-23 * temperature_k) * 1e9;
+    const auto planck = [&](double nm) { return std::pow(nm, -5) / std::expm1(unit_nm / nm); };
+    double peak = 0;
+    for (double nm = 100; nm < 3000; nm += 0.5)
+      peak = std::max(peak, planck(nm));
+    double seen = 0;
+    double white = 0;
+    for (double nm = 360; nm <= 830; nm += 1) {
+      seen += planck(nm) / peak * ColorMatching(nm)[1];
+      white += ColorMatching(nm)[1];
+    }
+    EXPECT_NEAR(
+        luminance("\"blackbody L\" " + std::to_string(temperature_k) + portal) / (3 * seen / white),
+        1, 1e-3);
+  }
+}
+
 TEST(PbrtParserTest, AttributesAreDefaultsThatAShapeMayOverride) {
   const Scene scene = ReadWorld(
       "AttributeBegin Attribute \"shape\" \"float radius\" 3 Attribute \"light\" \"float scale\" 2 "

@@ -6,25 +6,8 @@
 #include "render/base/text.h"
 #include "render/formats/mitsuba/mitsuba_reader.h"
 #include "render/formats/wavelength_color.h"
-#include "render/math/color_matching.h"
 
 namespace lucerna {
-namespace {
-
-// The luminance of light with this curve, where light of value 1 at all wavelengths has 1.
-double LuminanceOf(const WavelengthCurve& curve) {
-  double seen = 0;
-  double white = 0;
-  for (int nm = 380; nm <= 780; ++nm) {
-    const double y = ColorMatching(nm)[1];
-    seen += y * curve.At(nm);
-    white += y;
-  }
-  return seen / white;
-}
-
-}  // namespace
-
 UnfinishedScene MitsubaTranslator::Translate() {
   TranslateView();
   reader_.CarryOut(Directive("WorldBegin", document_.scene));

@@ -9,6 +9,7 @@
 #include "render/base/text.h"
 #include "render/formats/pbrt/light_readers.h"
 #include "render/formats/pbrt/shapes.h"
+#include "render/formats/wavelength_color.h"
 #include "render/math/double3.h"
 #include "render/math/equal_area_square.h"
 #include "render/math/warp.h"
@@ -72,6 +73,16 @@ std::optional<Portal> ReadPortal(ParameterList& parameters) {
   return portal;
 }
 
+// Of a light with a portal pbrt-v4 makes a picture of one pixel, which it does not scale to
+// luminance 1: its curve has the unit of the file, and a black body is 1 at its peak.
+double LuminanceInPicture(ParameterList& parameters, const GivenSpectrum& spectrum) {
+  const Parameter* const emission = parameters.FindWhole("L");
+  if (emission == nullptr || !spectrum.is_given()) return 1;
+  const double luminance = LuminanceOf(*spectrum.curve);
+  return emission->type == "blackbody" ? luminance / BlackbodyPeak(emission->numbers[0])
+                                       : luminance;
+}
+
 void ReadEnvironment(const LightInput& input, double scale, double illuminance,
                      const std::optional<Portal>& portal) {
   ParameterList& parameters = input.parameters;
@@ -133,6 +144,7 @@ void ReadInfiniteLight(const LightInput& input) {
   }
   GivenSpectrum spectrum;
   const Rgb color = parameters.FindEmission("L", &spectrum).value_or(Gray(1));
+  if (portal.has_value()) scale *= LuminanceInPicture(parameters, spectrum);
   // A surface that sees constant radiance L over its hemisphere receives pi L.
   if (illuminance > 0) scale *= illuminance / kPi64;
   InfiniteLight light;
