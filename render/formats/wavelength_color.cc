@@ -16,7 +16,7 @@ Xyz Observe(const Curve& curve) {
   Xyz sum = {0, 0, 0};
   for (double nm = kFirstNm; nm <= kLastNm; nm += 1) {
     const double value = curve(nm);
-    const Xyz matching = ColorMatching(nm);
+    const Xyz matching = CieObserver(nm);
     for (std::size_t i = 0; i < 3; ++i)
       sum[i] += value * matching[i];
   }

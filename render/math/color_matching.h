@@ -1,8 +1,7 @@
 // What does the eye see of light of one wavelength?
 //
-// Source: Wyman, Sloan and Shirley 2013, "Simple Analytic Approximations to the CIE XYZ Color
-// Matching Functions" (the multi-lobe fit, within about 1 % of the CIE 1931 observer); CIE 15 for
-// the daylight illuminant D65; IEC 61966-2-1 for Rec. 709.
+// Source: CIE 15:2004, table T.4 (colour-matching functions of the 1931 observer of 2 degrees, 5
+// nm) and the daylight illuminant D65; IEC 61966-2-1 for Rec. 709.
 #pragma once
 
 #include <array>
@@ -11,8 +10,11 @@ namespace lucerna {
 
 using Xyz = std::array<double, 3>;
 
-// CIE XYZ of light of that wavelength.
-[[nodiscard]] Xyz ColorMatching(double nm);
+// What lies outside has less than 1e-4 of daylight's luminance.
+inline constexpr double kFirstObservedNm = 380, kLastObservedNm = 780;
+
+// CIE XYZ of light of that wavelength; zero outside.
+[[nodiscard]] Xyz CieObserver(double nm);
 
 // D65, relative: 100 at 560 nm, zero outside 380 to 780 nm.
 [[nodiscard]] double D65At(double nm);

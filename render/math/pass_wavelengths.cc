@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "render/base/status.h"
-#include "render/math/cie_observer.h"
+#include "render/math/color_matching.h"
 #include "render/math/color_space.h"
 #include "render/math/rng.h"
 #include "render/math/sobol.h"

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "render/base/status.h"
-#include "render/math/cie_observer.h"
+#include "render/math/color_matching.h"
 
 namespace lucerna {
 namespace {

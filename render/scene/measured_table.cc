@@ -45,7 +45,7 @@ std::vector<Rgb> ColorsOf(const std::vector<float>& wavelength_nm) {
   std::vector<Xyz> sums(wavelength_nm.size(), Xyz{0, 0, 0});
   Xyz white = {0, 0, 0};
   for (double nm = kFirstNm; nm <= kLastNm; nm += 1) {
-    const Xyz matching = ColorMatching(nm);
+    const Xyz matching = CieObserver(nm);
     const GridCell cell = Between(wavelength_nm, static_cast<float>(nm));
     const auto within = static_cast<double>(cell.within);
     for (std::size_t i = 0; i < 3; ++i) {

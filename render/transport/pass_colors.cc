@@ -6,7 +6,7 @@
 #include <cstddef>
 
 #include "render/base/status.h"
-#include "render/math/cie_observer.h"
+#include "render/math/color_matching.h"
 #include "render/math/color_space.h"
 #include "render/scene/measured_table.h"
 

@@ -24,7 +24,7 @@ Table MakeTable() {
   std::array<double, 3> sum{};
   for (std::size_t i = 0; i < kCells; ++i) {
     const double nm = kFirstVisibleNm + static_cast<double>(i) + 0.5;
-    const std::array<double, 3> rec709 = Rec709(ColorMatching(nm));
+    const std::array<double, 3> rec709 = Rec709(CieObserver(nm));
     for (std::size_t c = 0; c < 3; ++c) {
       double value = 0;
       for (std::size_t k = 0; k < 3; ++k)

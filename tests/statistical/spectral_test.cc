@@ -14,7 +14,7 @@
 #include "gtest/gtest.h"
 
 #include "render/formats/wavelength_color.h"
-#include "render/math/cie_observer.h"
+#include "render/math/color_matching.h"
 #include "render/math/color_space.h"
 #include "render/math/dispersion.h"
 #include "render/transport/bsdf.h"

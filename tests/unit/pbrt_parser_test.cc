@@ -470,6 +470,23 @@ TEST(PbrtParserTest, ColoursByTemperatureAndWavelengthHaveLuminanceOne) {
 
 // ---- scopes, files
 
+// CIE illuminant A is the black body of 2,856 K, and has these coordinates (CIE 15:2004).
+TEST(PbrtParserTest, ABlackBodyHasTheColourOfIlluminantA) {
+  const Scene scene = ReadWorld("LightSource \"point\" \"blackbody I\" 2856");
+  const Rgb color = scene.point_lights.at(0).intensity;
+  const std::array<std::array<double, 3>, 3> to_xyz = {{{0.4124564, 0.3575761, 0.1804375},
+                                                        {0.2126729, 0.7151522, 0.0721750},
+                                                        {0.0193339, 0.1191920, 0.9503041}}};
+  std::array<double, 3> xyz{};
+  for (std::size_t row = 0; row < 3; ++row) {
+    for (std::size_t c = 0; c < 3; ++c)
+      xyz[row] += to_xyz[row][c] * static_cast<double>(color[static_cast<int>(c)]);
+  }
+  const double sum = xyz[0] + xyz[1] + xyz[2];
+  EXPECT_NEAR(xyz[0] / sum, 0.44758, 2e-4);
+  EXPECT_NEAR(xyz[1] / sum, 0.40745, 2e-4);
+}
+
 // pbrt-v4 makes a picture of such a light, and a picture has the unit of its file: a black body is
 // 1 where it is brightest, at any wavelength.
 TEST(PbrtParserTest, BehindAPortalColoursByTemperatureAndWavelengthKeepTheirUnit) {
@@ -491,8 +508,8 @@ TEST(PbrtParserTest, BehindAPortalColoursByTemperatureAndWavelengthKeepTheirUnit
     double seen = 0;
     double white = 0;
     for (double nm = 360; nm <= 830; nm += 1) {
-      seen += planck(nm) / peak * ColorMatching(nm)[1];
-      white += ColorMatching(nm)[1];
+      seen += planck(nm) / peak * CieObserver(nm)[1];
+      white += CieObserver(nm)[1];
     }
     EXPECT_NEAR(
         luminance("\"blackbody L\" " + std::to_string(temperature_k) + portal) / (3 * seen / white),

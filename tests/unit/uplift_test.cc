@@ -7,7 +7,7 @@
 
 #include "gtest/gtest.h"
 
-#include "render/math/cie_observer.h"
+#include "render/math/color_matching.h"
 #include "render/math/color_space.h"
 
 namespace lucerna {

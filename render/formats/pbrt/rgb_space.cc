@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "render/base/text.h"
-#include "render/math/cie_observer.h"
+#include "render/math/color_matching.h"
 #include "render/math/color_space.h"
 
 namespace lucerna {
