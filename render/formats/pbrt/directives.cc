@@ -191,8 +191,9 @@ void DirectiveReader::CheckRoom(const SourceLocation& location) {
     return;
   }
   std::size_t bytes =
-      scene_.materials.size() * sizeof(Material) + scene_.textures.size() * sizeof(Texture) +
-      scene_.media.size() * sizeof(Medium) + scene_.area_lights.size() * sizeof(AreaLight) +
+      densities_bytes_ + scene_.materials.size() * sizeof(Material) +
+      scene_.textures.size() * sizeof(Texture) + scene_.media.size() * sizeof(Medium) +
+      scene_.area_lights.size() * sizeof(AreaLight) +
       scene_.infinite_lights.size() * sizeof(InfiniteLight) +
       scene_.motion.of_shapes.size() * (sizeof(ShapeMotion) + sizeof(AnimatedTransform));
   ForEachDeltaList(scene_, [&](const auto& lights) {
@@ -200,8 +201,8 @@ void DirectiveReader::CheckRoom(const SourceLocation& location) {
   });
   const std::uint64_t most = assets_.limits().max_shape_bytes;
   if (bytes <= most) return;
-  diagnostics_.Error(location, Concat("with this, the materials, textures and lights of the scene "
-                                      "take more than the ",
+  diagnostics_.Error(location, Concat("with this, the materials, media, textures and lights of the "
+                                      "scene take more than the ",
                                       most,
                                       " bytes of memory that there are for them; give each "
                                       "once, and refer to it by its name"));

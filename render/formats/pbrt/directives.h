@@ -205,6 +205,7 @@ class DirectiveReader {
   std::uint64_t texts_read_ = 0;
   std::uint64_t shapes_cost_ = 0;
   std::uint64_t shapes_bytes_ = 0;
+  std::uint64_t densities_bytes_ = 0;  // of media
   bool is_stopped_ = false;
 
   GraphicsStack graphics_;

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "render/base/text.h"
+#include "render/formats/cloud_density.h"
 #include "render/formats/pbrt/measured_media.h"
 #include "render/scene/density_grid.h"
 
@@ -40,6 +41,45 @@ void RefuseEmission(ParameterList& parameters, bool is_grid) {
     parameters.Ignore(name);
 }
 
+// The box that a grid fills, and where it is.
+struct GridBox {
+  Vec3 low, high;
+  Transform from_world;
+};
+std::optional<GridBox> ReadBox(ParameterList& parameters, const Transform& to_world) {
+  const Vec3 p0 = parameters.Point("p0", {0, 0, 0});
+  const Vec3 p1 = parameters.Point("p1", {1, 1, 1});
+  GridBox box;
+  box.low = {std::min(p0.x, p1.x), std::min(p0.y, p1.y), std::min(p0.z, p1.z)};
+  box.high = {std::max(p0.x, p1.x), std::max(p0.y, p1.y), std::max(p0.z, p1.z)};
+  if (!(box.high.x > box.low.x && box.high.y > box.low.y && box.high.z > box.low.z)) {
+    parameters.Error("p1", "makes the box from p0 flat");
+    return std::nullopt;
+  }
+  const StatusOr<Transform> from_world = to_world.Inverse();
+  if (!from_world.ok()) {
+    parameters.Error(Concat("has no place: ", from_world.status().message()));
+    return std::nullopt;
+  }
+  box.from_world = *from_world;
+  return box;
+}
+
+// nullptr after an error.
+std::shared_ptr<const DensityGrid> ReadCloud(ParameterList& parameters, const Transform& to_world) {
+  CloudShape shape;
+  shape.density = static_cast<float>(parameters.Float("density", 1, kZeroOrMore));
+  shape.wispiness = static_cast<float>(parameters.Float("wispiness", 1, kZeroOrMore));
+  // Places are whole features and a rest, in single precision.
+  shape.frequency = static_cast<float>(parameters.Float("frequency", 5, {0, 1e4}));
+  const std::optional<GridBox> box = ReadBox(parameters, to_world);
+  // What follows takes seconds.
+  if (!box.has_value() || parameters.diagnostics().has_error()) return nullptr;
+  const std::array<int, 3> size = CloudGridSize(shape, box->low, box->high);
+  return std::make_shared<const DensityGrid>(size, CloudDensities(shape, size, box->low, box->high),
+                                             box->low, box->high, box->from_world);
+}
+
 // nullptr after an error.
 std::shared_ptr<const DensityGrid> ReadDensity(ParameterList& parameters,
                                                const Transform& to_world) {
@@ -53,8 +93,7 @@ std::shared_ptr<const DensityGrid> ReadDensity(ParameterList& parameters,
     size[axis] = static_cast<int>(count);
     points *= static_cast<std::uint64_t>(count);
   }
-  const Vec3 p0 = parameters.Point("p0", {0, 0, 0});
-  const Vec3 p1 = parameters.Point("p1", {1, 1, 1});
+  const std::optional<GridBox> box = ReadBox(parameters, to_world);
   const std::span<const double> numbers = parameters.Numbers("density", kFloats, 1);
   if (numbers.empty()) {
     if (!parameters.Has("density")) parameters.Error("needs \"float density\"");
@@ -74,18 +113,8 @@ std::shared_ptr<const DensityGrid> ReadDensity(ParameterList& parameters,
     }
     values.push_back(static_cast<float>(number));
   }
-  const Vec3 low = {std::min(p0.x, p1.x), std::min(p0.y, p1.y), std::min(p0.z, p1.z)};
-  const Vec3 high = {std::max(p0.x, p1.x), std::max(p0.y, p1.y), std::max(p0.z, p1.z)};
-  if (!(high.x > low.x && high.y > low.y && high.z > low.z)) {
-    parameters.Error("p1", "makes the box from p0 flat");
-    return nullptr;
-  }
-  const StatusOr<Transform> from_world = to_world.Inverse();
-  if (!from_world.ok()) {
-    parameters.Error("density", Concat("has no place: ", from_world.status().message()));
-    return nullptr;
-  }
-  return std::make_shared<const DensityGrid>(size, values, low, high, *from_world);
+  if (!box.has_value()) return nullptr;
+  return std::make_shared<const DensityGrid>(size, values, box->low, box->high, box->from_world);
 }
 
 }  // namespace
@@ -97,16 +126,17 @@ Medium ReadMedium(ParameterList& parameters, const Transform& to_world) {
     if (!parameters.Has("type")) parameters.Error("needs \"string type\"");
     return medium;
   }
-  if (*type == "rgbgrid" || *type == "nanovdb" || *type == "cloud") {
+  if (*type == "rgbgrid" || *type == "nanovdb") {
     parameters.Error("type", Concat("is ", Quoted(*type),
                                     ", which is not supported; media of uneven density are "
-                                    "uniformgrid here, with one density at each point"));
+                                    "uniformgrid here, with one density at each point, or "
+                                    "cloud"));
     return medium;
   }
-  if (*type != "homogeneous" && *type != "uniformgrid") {
+  if (*type != "homogeneous" && *type != "uniformgrid" && *type != "cloud") {
     parameters.Error("type", Concat("is ", Quoted(*type),
-                                    ", which is not supported; there are homogeneous and "
-                                    "uniformgrid"));
+                                    ", which is not supported; there are homogeneous, "
+                                    "uniformgrid and cloud"));
     return medium;
   }
   const bool is_grid = *type == "uniformgrid";
@@ -114,6 +144,8 @@ Medium ReadMedium(ParameterList& parameters, const Transform& to_world) {
     medium.density = ReadDensity(parameters, to_world);
     if (medium.density != nullptr && !(medium.density->largest() > 0))
       parameters.Warning("density", "is 0 everywhere: the medium does nothing");
+  } else if (*type == "cloud") {
+    medium.density = ReadCloud(parameters, to_world);
   }
   // As pbrt-v4: each 1 where it is not given.
   medium.absorption =

@@ -14,6 +14,7 @@
 #include "render/formats/pbrt/rgb_space.h"
 #include "render/formats/pbrt/settings.h"
 #include "render/formats/pbrt/spectrum_files.h"
+#include "render/scene/density_grid.h"
 #include "render/scene/shape_lists.h"
 
 namespace lucerna {
@@ -455,6 +456,7 @@ bool DirectiveReader::OnMakeNamedMedium(Arguments& arguments) {
   StandsAffine(arguments);
   Medium medium = ReadMedium(list, graphics_.state().to_world.start);
   medium.name = name;
+  if (medium.density != nullptr) densities_bytes_ += medium.density->bytes();
   scene_.media[static_cast<std::size_t>(named.index)] = std::move(medium);
   return true;
 }
