@@ -7,12 +7,12 @@
 namespace lucerna {
 namespace {
 
-bool IsSaturated(Rgb color) {
+bool IsSaturated(Rgb color, float share = kSaturatedShare) {
   // Next to black a colour does not matter.
   constexpr float kDark = 0.02F;
   const float least = std::min(color.r, std::min(color.g, color.b));
   const float largest = MaxChannel(color);
-  return largest > kDark && least < kSaturatedShare * largest;
+  return largest > kDark && least < share * largest;
 }
 
 // Of light as of a reflectance, however bright it is.
@@ -30,6 +30,10 @@ Rgb MetalColor(const Material& metal) {
           channel(metal.eta.b, metal.k.b)};
 }
 
+bool IsMetalByWavelength(const Material& metal) {
+  return metal.given.spectra != nullptr && metal.given.spectra->eta.is_given();
+}
+
 bool IsSaturated(const Material& material) {
   if (material.Disperses()) return true;
   using Kind = Material::Kind;
@@ -38,7 +42,9 @@ bool IsSaturated(const Material& material) {
   switch (material.kind) {
     case Kind::kConductor:
     case Kind::kCoatedConductor:
-      return has_color && IsSaturated(MetalColor(material));
+      return has_color &&
+             IsSaturated(MetalColor(material),
+                         IsMetalByWavelength(material) ? kSaturatedMetal : kSaturatedShare);
     case Kind::kDiffuse:
     case Kind::kCoatedDiffuse:
     case Kind::kSubsurface:

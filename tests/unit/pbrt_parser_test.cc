@@ -11,6 +11,7 @@
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
+#include "render/formats/pbrt/optical_constants.h"
 #include "render/formats/read_scene.h"
 #include "render/math/color_matching.h"
 #include "render/math/color_space.h"
@@ -333,12 +334,13 @@ TEST(PbrtParserTest, Materials) {
   EXPECT_EQ(MaterialOf("\"diffuse\" \"rgb reflectance\" [0.1 0.2 0.3]").reflectance,
             (Rgb{0.1F, 0.2F, 0.3F}));
   const Material copper = MaterialOf("\"conductor\"");
-  ExpectNear(copper.eta, {0.200438F, 0.924033F, 1.102212F});
+  const auto curve_of = [](const std::string& name) { return *MetalSpectrumNamed(name).curve; };
+  EXPECT_EQ(*copper.given.spectra->eta.curve, curve_of("metal-Cu-eta"));
   EXPECT_EQ(copper.alpha_u, 0);
   const Material gold =
       MaterialOf("\"conductor\" \"spectrum eta\" \"metal-Au-eta\" \"spectrum k\" [\"metal-Au-k\"]");
-  ExpectNear(gold.eta, {0.143119F, 0.374957F, 1.442479F});
-  ExpectNear(gold.k, {3.983160F, 2.385721F, 1.603215F});
+  EXPECT_EQ(*gold.given.spectra->eta.curve, curve_of("metal-Au-eta"));
+  EXPECT_EQ(*gold.given.spectra->k.curve, curve_of("metal-Au-k"));
   const Material reflecting = MaterialOf("\"conductor\" \"rgb reflectance\" [0.5 0 1]");
   EXPECT_EQ(reflecting.eta, Gray(1));
   EXPECT_NEAR(reflecting.k.r, 2, 1e-5);
@@ -940,8 +942,9 @@ TEST(PbrtParserTest, ReadsSpectraFromFiles) {
       "Material \"conductor\" \"spectrum eta\" \"n.spd\" \"spectrum k\" [400 1 700 3] "
       "Shape \"sphere\"",
       {{"n.spd", "# index\n400 0\n700\t3 # of refraction\r\n"}});
-  EXPECT_FLOAT_EQ(scene.materials[1].eta.r, 2.3F);  // at 630 nm
-  EXPECT_FLOAT_EQ(scene.materials[1].k.g, 1.88F);   // at 532 nm
+  const MaterialSpectra& given = *scene.materials[1].given.spectra;
+  EXPECT_DOUBLE_EQ(given.eta.curve->At(630), 2.3);
+  EXPECT_DOUBLE_EQ(given.k.curve->At(532), 1.88);
 }
 
 TEST(PbrtParserTest, NeedsAWorldAndACamera) {

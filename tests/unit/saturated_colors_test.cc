@@ -1,11 +1,13 @@
 // Which scenes are rendered with wavelengths unless a job says otherwise?
 #include "render/scene/saturated_colors.h"
 
+#include <string>
 #include <vector>
 
 #include "gtest/gtest.h"
 
 #include "render/scene/render_settings.h"
+#include "tests/support/pbrt_text.h"
 #include "tests/support/test_scenes.h"
 
 namespace lucerna {
@@ -39,6 +41,20 @@ TEST(SaturatedColorsTest, OfLightsHoweverFaint) {
   EXPECT_FALSE(HasSaturatedColors(scene));
   scene.point_lights.push_back({.position = {}, .intensity = {1e-6F, 1e-6F, 1e-5F}});
   EXPECT_TRUE(HasSaturatedColors(scene));
+}
+
+// Copper has three reflectances that are its colour, gold has not.
+TEST(SaturatedColorsTest, OfMetalsByWavelength) {
+  const auto scene_with = [](const std::string& metal) {
+    return ReadWorld("Material \"conductor\" " + metal + " Shape \"sphere\"");
+  };
+  const auto named = [](const std::string& name) {
+    return "\"spectrum eta\" \"metal-" + name + "-eta\" \"spectrum k\" \"metal-" + name + "-k\"";
+  };
+  EXPECT_TRUE(HasSaturatedColors(scene_with(named("Au"))));
+  EXPECT_FALSE(HasSaturatedColors(scene_with(named("Cu"))));
+  EXPECT_FALSE(HasSaturatedColors(scene_with(named("Al"))));
+  EXPECT_FALSE(HasSaturatedColors(scene_with("\"rgb reflectance\" [0.9 0.7 0.3]")));
 }
 
 TEST(SaturatedColorsTest, OfGlassThatDisperses) {

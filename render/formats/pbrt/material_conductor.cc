@@ -3,6 +3,7 @@
 
 #include "render/base/text.h"
 #include "render/formats/pbrt/material_readers.h"
+#include "render/formats/pbrt/metal_fit.h"
 #include "render/formats/pbrt/optical_constants.h"
 
 namespace lucerna {
@@ -31,6 +32,12 @@ void ReadMetal(const MetalParameters& called, const MaterialInput& input, Materi
     material.eta =
         parameters.FindOpticalConstant(called.eta, {0, 100}, &given.eta).value_or(copper.eta);
     material.k = parameters.FindOpticalConstant(called.k, {0, 1000}, &given.k).value_or(copper.k);
+    if (given.eta.is_given() && given.k.is_given()) {
+      const MetalConstants fitted =
+          FitMetal(*given.eta.curve, *given.k.curve, {material.eta, material.k});
+      material.eta = fitted.eta;
+      material.k = fitted.k;
+    }
   }
   material.given = OwnedSpectra(std::move(given));
 }
