@@ -66,10 +66,8 @@ class EdgeSplitter {
 
  private:
   [[nodiscard]] double LengthOf(std::uint32_t a, std::uint32_t b) const {
-    // The same both ways: edges are split alike on both sides.
-    const Vec3 from = mesh_.positions[std::min(a, b)];
-    const Vec3 to = mesh_.positions[std::max(a, b)];
-    return Length(Double3(to_world_.Point(to)) - Double3(to_world_.Point(from)));
+    return Length(Double3(to_world_.Point(mesh_.positions[a])) -
+                  Double3(to_world_.Point(mesh_.positions[b])));
   }
   // Turned so that the edge between the first two is the longest.
   [[nodiscard]] Triangle LongestFirst(Triangle triangle) const {

@@ -82,7 +82,7 @@ struct CoatTable {
   // polynomials, the same for all metals.
   static constexpr std::array<float, 4> kMetalCosines = {1.0F, 0.8535534F, 0.5F, 0.1464466F};
   using CosineWeights = std::array<float, kMetalCosines.size()>;
-  // [kCosines] over all meetings of the residual of each direction.
+  // [kCosines] over the meetings of light that meets the metal more than once, of each direction.
   std::vector<CosineWeights> residual_cosines;
   // [kCosines], or empty under a smooth coat: what the facets of a rough one add to the weights of
   // light that meets the metal once, from each of its two directions.

@@ -71,7 +71,7 @@ float LeftOf(const CoatMeetings& meetings, float reflectance) {
 // HazeColor of a layer that does not scatter, for light from a direction at `cosine`.
 Rgb ResidualColor(const Material& material, const Absorbed& absorbed, float cosine) {
   const CoatMeetings meetings = CoatMeetingsOf(material, cosine);
-  const Rgb metal = HeldInUnit(Gray(1) - MeanOf(absorbed, meetings.cosines));
+  const Rgb metal = HeldInUnit(Gray(1) - MeanOf(absorbed, CoatResidualCosines(material, cosine)));
   return {LeftOf(meetings, metal.r), LeftOf(meetings, metal.g), LeftOf(meetings, metal.b)};
 }
 
@@ -163,9 +163,9 @@ Rgb EvaluateUp(const Material& material, Vec3 up, Vec3 wi) {
       Half(up_in, wi_in, m)) {
     const Ggx ggx = BaseFacets(material);
     const float jacobian = 1 / (4 * up_in.z * wi_in.z * Square(material.ior));
-    const Absorbed absorbed = AbsorbedAtCosines(material);
+    const Absorbed absorbed = material.HasHaze() ? Absorbed() : AbsorbedAtCosines(material);
     Rgb metal = MetalInCoat(material, Dot(up_in, m));
-    if (!HasNoFacets(material)) {
+    if (!HasNoFacets(material) && !material.HasHaze()) {
       metal = HeldInUnit(metal - MeanOf(absorbed, CoatOnceCosines(material, up.z)) -
                          MeanOf(absorbed, CoatOnceCosines(material, wi.z)));
     }

@@ -129,8 +129,11 @@ CoatMeetings CoatMeetingsOf(const Material& material, float cosine) {
     return ReadTable(material,
                      [&](const CoatTable& table) { return AtCosine(table.*column, 0, cosine); });
   };
-  return {at(&CoatTable::met_once), at(&CoatTable::goes_on),
-          ReadWeights(material, &CoatTable::residual_cosines, cosine)};
+  return {at(&CoatTable::met_once), at(&CoatTable::goes_on)};
+}
+
+CoatTable::CosineWeights CoatResidualCosines(const Material& material, float cosine) {
+  return ReadWeights(material, &CoatTable::residual_cosines, cosine);
 }
 
 CoatTable::CosineWeights CoatOnceCosines(const Material& material, float cosine) {

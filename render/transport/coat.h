@@ -78,9 +78,10 @@ void FitCoat(MaterialNumbers& material);
 // What a metal makes of that term, of light from a direction at `cosine` outside: CoatTable.
 struct CoatMeetings {
   float once = 0, goes_on = 0;
-  CoatTable::CosineWeights cosines = {};
 };
 [[nodiscard]] CoatMeetings CoatMeetingsOf(const Material& material, float cosine);
+// CoatTable::residual_cosines, of a layer that does not scatter.
+[[nodiscard]] CoatTable::CosineWeights CoatResidualCosines(const Material& material, float cosine);
 // CoatTable::once_cosines, zeros under a smooth coat.
 [[nodiscard]] CoatTable::CosineWeights CoatOnceCosines(const Material& material, float cosine);
 // CoatTable::widening, of a prepared material.

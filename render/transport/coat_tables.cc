@@ -412,7 +412,8 @@ void AddMeetings(const std::array<double, CoatTable::kHits + 1>& shares, const N
   const double share = more > 0 ? left / more : 1;
   table.met_once[node] = all > 0 ? static_cast<float>(shares[1] / all) : 0.0F;
   table.goes_on[node] = static_cast<float>((1 - share) / (1 - kMediumReflectance * share));
-  table.residual_cosines[node] = cosines.more.Mean();
+  // Where nothing meets the metal again, what is left of light that meets it once is there.
+  table.residual_cosines[node] = (cosines.more.weight > 0 ? cosines.more : cosines.once).Mean();
 }
 
 // Fills CoatTable::once_cosines: numbers of the two directions, d(w) + d(w'), whose mean over what
@@ -420,7 +421,7 @@ void AddMeetings(const std::array<double, CoatTable::kHits + 1>& shares, const N
 void AddOnce(const Between& reflected, const std::vector<NodeCosines>& walked, CoatTable& table) {
   constexpr std::size_t kCosines = CoatTable::kCosines;
   constexpr int kRounds = 64;
-  // Over azimuths an average.
+  // Over azimuths a mean, up to a factor.
   std::vector<double> entering(kCosines);
   for (std::size_t at = 0; at < table.entering.size(); ++at)
     entering[at % kCosines] += static_cast<double>(table.entering[at]);

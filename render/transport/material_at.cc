@@ -18,7 +18,7 @@ Rgb ValueOf(const Scene& scene, const Material& material, Rgb color) {
   return TexturedValueAtWavelengths(material.kind, scene.uplift->Reflectance(color));
 }
 
-// No surface scatters more than falls in.
+// Held at 1, as in pbrt-v4.
 Rgb Scaled(Rgb color, float scale) {
   return {std::min(color.r * scale, 1.0F), std::min(color.g * scale, 1.0F),
           std::min(color.b * scale, 1.0F)};

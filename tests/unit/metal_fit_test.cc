@@ -71,7 +71,8 @@ TEST(MetalFitTest, HasTheColourOfTheCurvesAtAllAngles) {
 // Constants that do not depend on wavelength are their own fit, with absorption and without.
 TEST(MetalFitTest, FlatCurvesStayAsTheyAre) {
   const auto flat = [](double value) { return WavelengthCurve{{300, 900}, {value, value}}; };
-  for (const auto& [n, k] : {std::pair{0.4, 2.5}, {1.5, 7.0}, {2.9, 3.1}, {1.7, 0.0}}) {
+  for (const auto& [n, k] :
+       {std::pair{0.4, 2.5}, {1.5, 7.0}, {2.9, 3.1}, {30.0, 30.0}, {1.7, 0.0}, {50.0, 0.0}}) {
     const MetalConstants fitted = FitMetal(flat(n), flat(k), {Gray(2), Gray(k > 0 ? 2.0F : 0)});
     for (int c = 0; c < 3; ++c) {
       EXPECT_NEAR(static_cast<double>(fitted.eta[c]), n, 1e-3 * n) << n << " " << k;

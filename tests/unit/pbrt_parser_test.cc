@@ -93,12 +93,17 @@ TEST(PbrtParserTest, MatricesAreWrittenColumnByColumn) {
 // What the fourth row does to points has no place here.
 TEST(PbrtParserTest, ThingsWithAPlaceNeedTransformsThatAreAffine) {
   const std::string matrix = "ConcatTransform [0 0 1 0  1 0 0 0  0 1 0 8.9  0 0 0 1] ";
-  const std::string wrong = "needs a transform that is affine";
+  const std::string wrong = "needs transforms that are affine";
   for (const char* const thing :
        {"Shape \"sphere\"", "LightSource \"point\"", "Texture \"t\" \"spectrum\" \"checkerboard\"",
         "CoordinateSystem \"c\" Identity CoordSysTransform \"c\" Scale 2 2 2 Shape \"disk\""})
     EXPECT_THAT(SaidOfWorld(matrix + thing), HasSubstr(wrong)) << thing;
   EXPECT_THAT(SaidOfWorld(matrix + "Identity Shape \"sphere\""), Not(HasSubstr(wrong)));
+  // A row that moves what a column has moved turns directions, too.
+  const std::string sky = "LightSource \"infinite\"";
+  EXPECT_THAT(SaidOfWorld(matrix + sky), Not(HasSubstr(wrong)));
+  EXPECT_THAT(SaidOfWorld(matrix + "Translate 1 0 0 " + sky), HasSubstr(wrong));
+  EXPECT_THAT(SaidOfWorld("Translate 1 0 0 " + matrix + sky), HasSubstr(wrong));
   EXPECT_THAT(SaidOfPbrt(matrix + "Camera \"perspective\" WorldBegin"), HasSubstr(wrong));
 }
 
@@ -389,11 +394,11 @@ TEST(PbrtParserTest, NamedMaterialsMayComeLaterAndScopesEnd) {
               HasSubstr("s.pbrt:2:1: error: there is no material \"none\"; define it"));
 }
 
-// As in pbrt-v4, which asks for it when a shape is made.
-TEST(PbrtParserTest, AMaterialThatNoShapeAsksForMayBeMissing) {
+// As in pbrt-v4, which looks for it when a shape is made.
+TEST(PbrtParserTest, AMaterialThatNoShapeHasMayBeMissing) {
   const std::string said =
       SaidOfWorld("AttributeBegin NamedMaterial \"none\" AttributeEnd Shape \"sphere\"");
-  EXPECT_THAT(said, HasSubstr("s.pbrt:2:16: warning: there is no material \"none\"; no shape"));
+  EXPECT_THAT(said, HasSubstr("s.pbrt:2:16: warning: there is no material \"none\"; no shape has"));
   EXPECT_THAT(said, Not(HasSubstr("error")));
 }
 
@@ -500,6 +505,11 @@ TEST(PbrtParserTest, BehindAPortalColoursByTemperatureAndWavelengthKeepTheirUnit
   EXPECT_NEAR(luminance("\"spectrum L\" [300 2 900 2]" + portal), 6, 1e-4);
   EXPECT_NEAR(luminance("\"spectrum L\" [300 2 900 2]"), 1, 1e-4);
   EXPECT_NEAR(luminance("\"rgb L\" [2 2 2]" + portal), 6, 1e-4);
+  // A picture's illuminance is that of its pixels, whatever their unit.
+  const std::string lux = portal + " \"float illuminance\" 2";
+  for (const std::string light :
+       {"\"spectrum L\" [300 2 900 2]", "\"rgb L\" [2 2 2]", "\"blackbody L\" 6500"})
+    EXPECT_NEAR(luminance(light + lux), 3 * 2 / std::numbers::pi, 1e-4) << light;
   for (const double temperature_k : {2500.0, 6500.0}) {
     // h c / (k T) in nm.
     const double unit_nm = 6.62607015e-34 * 299792458 / (1.380649e-23 * temperature_k) * 1e9;
@@ -565,6 +575,11 @@ TEST(PbrtParserTest, ParametersGoOnAfterTheFileInWhichTheyBegin) {
   EXPECT_EQ(scene.spheres[1].radius, 2);
   EXPECT_EQ(scene.spheres[1].traits.alpha, 0.5F);
   ExpectNear(scene.spheres[2].center, {1, 0, 0});
+  // A list that breaks off is one error, wherever it does.
+  const std::string broken =
+      SaidOf(ParseWorld("Include \"outer.pbrt\" \"float zmax\" [1 [ 2] Shape \"sphere\"", files));
+  EXPECT_THAT(broken, HasSubstr("have no closing ]"));
+  EXPECT_EQ(broken.find("error", broken.find("error") + 1), std::string::npos) << broken;
   // Not out of an import, which is a text of its own.
   EXPECT_THAT(SaidOf(ParseWorld("Import \"a.pbrt\" \"float zmin\" -1", files)),
               HasSubstr("s.pbrt:2:17: error: expected a directive, not \"float zmin\""));

@@ -176,7 +176,8 @@ void DirectiveReader::ReadDirectives(Tokenizer& tokens) {
     } else if (directive->phase == Phase::kInWorld && !in_world_) {
       arguments.Error(Concat(directive->name, " must come after WorldBegin"));
     }
-    if (!(this->*directive->handler)(arguments)) SkipToDirective(tokens);
+    // Its arguments may have gone on in the text that includes this one.
+    if (!(this->*directive->handler)(arguments)) SkipToDirective(arguments.tokens());
     CheckRoom(token.location);
   }
 }
@@ -258,7 +259,7 @@ void DirectiveReader::ReportNamedMaterials() {
                                                    "; define it by MakeNamedMaterial"));
     } else if (!material.is_defined) {
       diagnostics_.Warning(material.location,
-                           Concat("there is no material ", Quoted(name), "; no shape asks for it"));
+                           Concat("there is no material ", Quoted(name), "; no shape has it"));
     } else if (!material.is_used && is_mixed[index] == 0) {
       diagnostics_.Note(material.location, Concat("the material ", Quoted(name), " is not used"));
     }

@@ -20,6 +20,7 @@
 #include "render/formats/pbrt/arguments.h"
 #include "render/formats/pbrt/graphics_state.h"
 #include "render/formats/pbrt/materials.h"
+#include "render/formats/pbrt/media.h"
 #include "render/formats/pbrt/parameter_list.h"
 #include "render/formats/pbrt/shapes.h"
 #include "render/formats/pbrt/textures.h"
@@ -90,8 +91,8 @@ class DirectiveReader {
   bool Replace(Arguments& arguments, const Transform& transform, bool is_projective = false);
   bool Replace(Arguments& arguments, const TransformPair& transforms);
   bool ReadMatrix(Arguments& arguments, Transform& transform, bool& is_projective);
-  // Reports an error where it does not.
-  bool StandsAffine(Arguments& arguments);
+  // False, and reported, where the current transforms are not affine.
+  bool CheckAffine(Arguments& arguments);
   bool OnIdentity(Arguments& arguments);
   bool OnTranslate(Arguments& arguments);
   bool OnScale(Arguments& arguments);
@@ -206,6 +207,7 @@ class DirectiveReader {
   std::uint64_t shapes_cost_ = 0;
   std::uint64_t shapes_bytes_ = 0;
   std::uint64_t densities_bytes_ = 0;  // of media
+  std::uint64_t cloud_points_left_ = kMostCloudPoints;
   bool is_stopped_ = false;
 
   GraphicsStack graphics_;

@@ -25,13 +25,15 @@ inline constexpr std::size_t kAttributeTargets = 5;
 // Where something is at the beginning of a motion and at its end.
 struct TransformPair {
   Transform start, end;
-  // One of them was given with a fourth row that is not 0, 0, 0, 1, which is left out: what it does
-  // to directions is right, and what it does to points is not.
+  // One of them was given with a fourth row that is not 0, 0, 0, 1, which is left out: without a
+  // translation what it does to directions is right, and what it does to points is not.
   bool is_projective = false;
 
   [[nodiscard]] bool Moves() const { return start != end; }
   bool operator==(const TransformPair&) const = default;
 };
+
+[[nodiscard]] bool HasTranslation(const TransformPair& transforms);
 
 // What AttributeBegin saves and AttributeEnd restores. Large parts are shared, so that a copy is
 // small however much the text put into them.

@@ -14,7 +14,7 @@
 namespace lucerna {
 
 void DirectiveReader::PlaceInstance(Object& object, Arguments& arguments) {
-  if (!StandsAffine(arguments)) return;
+  if (!CheckAffine(arguments)) return;
   const TransformPair& places = graphics_.state().to_world;
   const Transform& to_world = places.start;
   const bool stays_similar = !places.Moves() || places.end.UniformScale().ok();

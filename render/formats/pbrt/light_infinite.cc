@@ -144,9 +144,14 @@ void ReadInfiniteLight(const LightInput& input) {
   }
   GivenSpectrum spectrum;
   const Rgb color = parameters.FindEmission("L", &spectrum).value_or(Gray(1));
-  if (portal.has_value()) scale *= LuminanceInPicture(parameters, spectrum);
-  // A surface that sees constant radiance L over its hemisphere receives pi L.
-  if (illuminance > 0) scale *= illuminance / kPi64;
+  // A surface that sees constant radiance L over its hemisphere receives pi L. As of a picture,
+  // the illuminance of a light with a portal is that of its radiance, whatever its unit is.
+  if (illuminance > 0) {
+    scale *= illuminance / kPi64;
+    if (portal.has_value() && Luminance(color) > 0) scale /= static_cast<double>(Luminance(color));
+  } else if (portal.has_value()) {
+    scale *= LuminanceInPicture(parameters, spectrum);
+  }
   InfiniteLight light;
   light.radiance = ScaledEmission(parameters, color, scale);
   light.portal = portal;

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "render/formats/pbrt/material_readers.h"
+#include "render/formats/wavelength_color.h"
 
 namespace lucerna {
 
@@ -13,13 +14,16 @@ float Held(float value) {
   return std::min(value, 1.0F);
 }
 
-// No surface scatters more than falls in.
+// Each of the two is held at 1, as in pbrt-v4; their sum may be above.
 void ScaleAndHold(float scale, Rgb& color, GivenSpectrum& spectrum) {
-  color = {Held(color.r * scale), Held(color.g * scale), Held(color.b * scale)};
-  if (!spectrum.is_given()) return;
+  if (!spectrum.is_given()) {
+    color = {Held(color.r * scale), Held(color.g * scale), Held(color.b * scale)};
+    return;
+  }
   WavelengthCurve curve = *spectrum.curve;
   for (double& value : curve.value)
     value = std::min(value * static_cast<double>(scale), 1.0);
+  color = ReflectanceColor(curve);
   spectrum.curve = std::make_shared<const WavelengthCurve>(std::move(curve));
 }
 

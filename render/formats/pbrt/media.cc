@@ -46,7 +46,7 @@ struct GridBox {
   Vec3 low, high;
   Transform from_world;
 };
-std::optional<GridBox> ReadBox(ParameterList& parameters, const Transform& to_world) {
+std::optional<GridBox> ReadGridBox(ParameterList& parameters, const Transform& to_world) {
   const Vec3 p0 = parameters.Point("p0", {0, 0, 0});
   const Vec3 p1 = parameters.Point("p1", {1, 1, 1});
   GridBox box;
@@ -66,16 +66,33 @@ std::optional<GridBox> ReadBox(ParameterList& parameters, const Transform& to_wo
 }
 
 // nullptr after an error.
-std::shared_ptr<const DensityGrid> ReadCloud(ParameterList& parameters, const Transform& to_world) {
+std::shared_ptr<const DensityGrid> ReadCloud(ParameterList& parameters, const Transform& to_world,
+                                             std::uint64_t& points_left) {
   CloudShape shape;
-  shape.density = static_cast<float>(parameters.Float("density", 1, kZeroOrMore));
-  shape.wispiness = static_cast<float>(parameters.Float("wispiness", 1, kZeroOrMore));
-  // Places are whole features and a rest, in single precision.
+  shape.density = static_cast<float>(parameters.Float("density", 1, {0, 1e6}));
+  shape.wispiness = static_cast<float>(parameters.Float("wispiness", 1, {0, 1e3}));
   shape.frequency = static_cast<float>(parameters.Float("frequency", 5, {0, 1e4}));
-  const std::optional<GridBox> box = ReadBox(parameters, to_world);
+  const std::optional<GridBox> box = ReadGridBox(parameters, to_world);
   // What follows takes seconds.
   if (!box.has_value() || parameters.diagnostics().has_error()) return nullptr;
+  // Places are whole features and a rest, in single precision.
+  constexpr float kFarthest = 1e6F;
+  const float farthest = std::max(MaxAbs(box->low), MaxAbs(box->high));
+  if (!(farthest * std::max(1.0F, shape.frequency) <= kFarthest)) {
+    parameters.Error("p1", Concat("and p0 must be within ", kFarthest,
+                                  " of the origin, in features of the noise and in lengths"));
+    return nullptr;
+  }
   const std::array<int, 3> size = CloudGridSize(shape, box->low, box->high);
+  const std::uint64_t points = static_cast<std::uint64_t>(size[0]) *
+                               static_cast<std::uint64_t>(size[1]) *
+                               static_cast<std::uint64_t>(size[2]);
+  if (points > points_left) {
+    parameters.Error("frequency", Concat("makes the clouds of the scene more than ",
+                                         kMostCloudPoints, " points; give fewer of them"));
+    return nullptr;
+  }
+  points_left -= points;
   return std::make_shared<const DensityGrid>(size, CloudDensities(shape, size, box->low, box->high),
                                              box->low, box->high, box->from_world);
 }
@@ -93,7 +110,7 @@ std::shared_ptr<const DensityGrid> ReadDensity(ParameterList& parameters,
     size[axis] = static_cast<int>(count);
     points *= static_cast<std::uint64_t>(count);
   }
-  const std::optional<GridBox> box = ReadBox(parameters, to_world);
+  const std::optional<GridBox> box = ReadGridBox(parameters, to_world);
   const std::span<const double> numbers = parameters.Numbers("density", kFloats, 1);
   if (numbers.empty()) {
     if (!parameters.Has("density")) parameters.Error("needs \"float density\"");
@@ -119,7 +136,8 @@ std::shared_ptr<const DensityGrid> ReadDensity(ParameterList& parameters,
 
 }  // namespace
 
-Medium ReadMedium(ParameterList& parameters, const Transform& to_world) {
+Medium ReadMedium(ParameterList& parameters, const Transform& to_world,
+                  std::uint64_t& cloud_points_left) {
   Medium medium;
   const std::optional<std::string> type = parameters.FindString("type");
   if (!type.has_value()) {
@@ -145,7 +163,7 @@ Medium ReadMedium(ParameterList& parameters, const Transform& to_world) {
     if (medium.density != nullptr && !(medium.density->largest() > 0))
       parameters.Warning("density", "is 0 everywhere: the medium does nothing");
   } else if (*type == "cloud") {
-    medium.density = ReadCloud(parameters, to_world);
+    medium.density = ReadCloud(parameters, to_world, cloud_points_left);
   }
   // As pbrt-v4: each 1 where it is not given.
   medium.absorption =

@@ -69,13 +69,25 @@ std::array<ByView, 3> ColorsOf(const WavelengthCurve& eta, const WavelengthCurve
   return colors;
 }
 
-// Beyond what visible light shows of any metal.
-constexpr double kLeastIndex = 0.01;
-constexpr double kMost = 20;
-
 struct Constants {
   double n, k;
 };
+
+// Where constants are looked for: not far from those of the curves.
+struct SearchRange {
+  Constants least, most;
+
+  [[nodiscard]] Constants Hold(Constants at) const {
+    return {std::clamp(at.n, least.n, most.n), std::clamp(at.k, least.k, most.k)};
+  }
+};
+SearchRange SearchRangeOf(const WavelengthCurve& eta, const WavelengthCurve& k) {
+  constexpr double kBeyond = 1.5;
+  constexpr double kLeastIndex = 0.01;
+  return {{kLeastIndex, 0},
+          {std::max(kLeastIndex, kBeyond * *std::ranges::max_element(eta.value)),
+           kBeyond * *std::ranges::max_element(k.value)}};
+}
 
 // Relative errors; a view counts by its cosine, as its flux does.
 ByView ErrorsOf(const Constants& constants, const ByView& wanted) {
@@ -95,12 +107,10 @@ double SquaresOf(const ByView& errors) {
 }
 
 // By Levenberg and Marquardt.
-Constants Fit(const ByView& wanted, Constants best) {
+Constants Fit(const ByView& wanted, const SearchRange& range, Constants best) {
   constexpr int kSteps = 60;
-  const auto held = [](Constants at) {
-    return Constants{std::clamp(at.n, kLeastIndex, kMost), std::clamp(at.k, 0.0, kMost)};
-  };
-  best = held(best);
+  constexpr double kLeastGain = 1e-14;
+  best = range.Hold(best);
   ByView errors = ErrorsOf(best, wanted);
   double damping = 1e-3;
   for (int step = 0; step < kSteps; ++step) {
@@ -127,13 +137,16 @@ Constants Fit(const ByView& wanted, Constants best) {
     kk += added;
     const double determinant = nn * kk - nk * nk;
     if (!(determinant > 0)) break;
-    const Constants next = held({best.n - (kk * n_error - nk * k_error) / determinant,
-                                 best.k - (nn * k_error - nk * n_error) / determinant});
+    const Constants next = range.Hold({best.n - (kk * n_error - nk * k_error) / determinant,
+                                       best.k - (nn * k_error - nk * n_error) / determinant});
     const ByView next_errors = ErrorsOf(next, wanted);
-    if (SquaresOf(next_errors) < SquaresOf(errors)) {
+    const double gained = SquaresOf(errors) - SquaresOf(next_errors);
+    if (gained > 0) {
+      const bool is_found = gained < kLeastGain;
       best = next;
       errors = next_errors;
       damping = std::max(1e-9, damping / 4);
+      if (is_found) break;
     } else {
       damping *= 4;
     }
@@ -146,12 +159,13 @@ Constants Fit(const ByView& wanted, Constants best) {
 MetalConstants FitMetal(const WavelengthCurve& eta, const WavelengthCurve& k,
                         const MetalConstants& first) {
   const std::array<ByView, 3> colors = ColorsOf(eta, k);
+  const SearchRange range = SearchRangeOf(eta, k);
   MetalConstants constants = first;
   const auto fit = [&](std::size_t c, float& n, float& absorption) {
     // Of no real metal.
     if (!std::ranges::all_of(colors[c], [](double color) { return color > 1e-6; })) return;
     const Constants fitted =
-        Fit(colors[c], {static_cast<double>(n), static_cast<double>(absorption)});
+        Fit(colors[c], range, {static_cast<double>(n), static_cast<double>(absorption)});
     n = static_cast<float>(fitted.n);
     absorption = static_cast<float>(fitted.k);
   };

@@ -59,7 +59,7 @@ bool DirectiveReader::OnCamera(Arguments& arguments) {
   unfinished_.has_camera = true;
   scene_.camera = {};
   scene_.motion.of_camera.reset();
-  StandsAffine(arguments);
+  CheckAffine(arguments);
   ReadCamera(type, list, scene_.camera, scene_.motion);
   const TransformPair& from_world = graphics_.state().to_world;
   const StatusOr<Transform> at_start = from_world.start.Inverse();
@@ -255,9 +255,10 @@ bool DirectiveReader::OnLightSource(Arguments& arguments) {
   std::vector<std::size_t> before;
   ForEachDeltaList(scene_, [&](const auto& lights) { before.push_back(lights.size()); });
   WarnIfMoved(arguments, "lights do not move, in pbrt-v4 neither");
-  if (type != "infinite") {
-    StandsAffine(arguments);
-  } else if (graphics_.state().to_world.is_projective) {
+  const TransformPair& places = graphics_.state().to_world;
+  if (type != "infinite" || HasTranslation(places)) {
+    CheckAffine(arguments);
+  } else if (places.is_projective) {
     list.Warning("", "has a transform that is not affine, of which it takes the upper three rows");
   }
   ReadLight(type, list, graphics_.state().to_world.start, assets_, scene_);
@@ -278,7 +279,7 @@ bool DirectiveReader::AddShape(Arguments& arguments, std::optional<TriangleMesh>
   std::vector<Parameter> parameters;
   if (!arguments.ReadTyped(type, parameters)) return false;
   GraphicsState& state = graphics_.state();
-  StandsAffine(arguments);
+  CheckAffine(arguments);
   const auto material = static_cast<std::size_t>(state.material);
   if (material >= materials_on_shapes_.size()) materials_on_shapes_.resize(material + 1);
   materials_on_shapes_[material] = true;
@@ -406,7 +407,7 @@ bool DirectiveReader::OnTexture(Arguments& arguments) {
   ParameterList list(arguments.SubjectOf(name), arguments.location(), std::move(parameters),
                      graphics_.state().DefaultsOf(AttributeTarget::kTexture).get(), diagnostics_);
   WarnIfMoved(arguments, "textures do not move, in pbrt-v4 neither");
-  StandsAffine(arguments);
+  CheckAffine(arguments);
   // Made first: a texture may not be a part of itself.
   NamedTexture made = ReadTexture(type, is_number, list, textures_,
                                   graphics_.state().to_world.start, assets_, scene_.textures);
@@ -453,8 +454,8 @@ bool DirectiveReader::OnMakeNamedMedium(Arguments& arguments) {
   NamedMedium& named = MediumCalled(name, arguments.location());
   if (named.is_defined) arguments.Error(Concat("the medium ", Quoted(name), " is defined twice"));
   named.is_defined = true;
-  StandsAffine(arguments);
-  Medium medium = ReadMedium(list, graphics_.state().to_world.start);
+  CheckAffine(arguments);
+  Medium medium = ReadMedium(list, graphics_.state().to_world.start, cloud_points_left_);
   medium.name = name;
   if (medium.density != nullptr) densities_bytes_ += medium.density->bytes();
   scene_.media[static_cast<std::size_t>(named.index)] = std::move(medium);

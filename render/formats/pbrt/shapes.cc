@@ -55,6 +55,8 @@ bool DisplaceMesh(const ShapeInput& input, TriangleMesh& mesh) {
   if (parameters.IsTexture("displacement")) {
     const NamedTexture* texture = FindNumbers("displacement", parameters, input.textures.numbers);
     if (texture == nullptr) return false;
+    // At places in the world, as textures are looked up everywhere; pbrt-v4 takes those of the
+    // shape's own space here.
     height = [&to_world, number = texture->number, all = input.textures.all](Vec3 position, Vec2 uv,
                                                                              Vec3 normal) {
       return static_cast<double>(

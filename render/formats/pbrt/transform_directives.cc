@@ -4,6 +4,20 @@
 #include "render/formats/pbrt/directives.h"
 
 namespace lucerna {
+namespace {
+
+void ReportProjective(Arguments& arguments) {
+  arguments.Error(Concat(arguments.directive(),
+                         " needs transforms that are affine: the 4th, 8th, 12th and 16th numbers "
+                         "of Transform and ConcatTransform must be 0, 0, 0 and 1"));
+}
+
+}  // namespace
+
+bool HasTranslation(const TransformPair& transforms) {
+  const Vec3 origin = {0, 0, 0};
+  return transforms.start.Point(origin) != origin || transforms.end.Point(origin) != origin;
+}
 
 bool DirectiveReader::Replace(Arguments& arguments, const TransformPair& transforms) {
   if (transforms.start.IsFinite() && transforms.end.IsFinite()) {
@@ -33,6 +47,10 @@ bool DirectiveReader::Concatenate(Arguments& arguments, const StatusOr<Transform
   }
   const GraphicsState& state = graphics_.state();
   TransformPair joined = state.to_world;
+  if (is_projective && HasTranslation(joined)) {
+    ReportProjective(arguments);
+    return true;
+  }
   joined.is_projective = joined.is_projective || is_projective;
   if (state.changes_start) joined.start = joined.start * *transform;
   if (state.changes_end) joined.end = joined.end * *transform;
@@ -79,12 +97,9 @@ bool DirectiveReader::ReadMatrix(Arguments& arguments, Transform& transform, boo
   return true;
 }
 
-bool DirectiveReader::StandsAffine(Arguments& arguments) {
+bool DirectiveReader::CheckAffine(Arguments& arguments) {
   if (!graphics_.state().to_world.is_projective) return true;
-  arguments.Error(Concat(arguments.directive(),
-                         " needs a transform that is affine: of the numbers of Transform and "
-                         "ConcatTransform before it the 4th, 8th, 12th and 16th must be 0, 0, 0 "
-                         "and 1"));
+  ReportProjective(arguments);
   return false;
 }
 
