@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <unordered_map>
 #include <utility>
@@ -43,6 +44,7 @@ class EdgeSplitter {
 
   // False with more than `most_triangles`.
   bool Split(std::size_t most_triangles) {
+    if (!(LeastTriangles() <= static_cast<double>(most_triangles))) return false;
     std::vector<Triangle> open;
     const std::vector<std::uint32_t> indices = std::exchange(mesh_.indices, {});
     for (std::size_t i = 0; i + 2 < indices.size(); i += 3) {
@@ -65,6 +67,22 @@ class EdgeSplitter {
   }
 
  private:
+  // At least so many there will be: the largest triangle without a longer edge is equilateral, and
+  // none has more of an edge than the length. What cannot end well shall not take its time.
+  [[nodiscard]] double LeastTriangles() const {
+    const double largest_area = std::sqrt(3.0) / 4 * edge_length_ * edge_length_;
+    double least = 0;
+    for (std::size_t i = 0; i + 2 < mesh_.indices.size(); i += 3) {
+      const auto [a, b, c] =
+          LongestFirst({mesh_.indices[i], mesh_.indices[i + 1], mesh_.indices[i + 2]});
+      const Double3 corner(to_world_.Point(mesh_.positions[a]));
+      const Double3 along = Double3(to_world_.Point(mesh_.positions[b])) - corner;
+      const Double3 to_third = Double3(to_world_.Point(mesh_.positions[c])) - corner;
+      const double area = Length(Cross(along, to_third)) / 2;
+      least += std::max({1.0, Length(along) / edge_length_, area / largest_area});
+    }
+    return least;
+  }
   [[nodiscard]] double LengthOf(std::uint32_t a, std::uint32_t b) const {
     return Length(Double3(to_world_.Point(mesh_.positions[a])) -
                   Double3(to_world_.Point(mesh_.positions[b])));
