@@ -350,14 +350,14 @@ void ForEachTurn(const Material& material, float cosine, const Visit& visit) {
 // [kCosines × kCosines] of the flux from one node, what leaves at each after one meeting with a
 // metal of these facets that reflects all, and so lets the coat's surface through. Over azimuths an
 // average.
-struct Between {
+struct NodeFlux {
   std::vector<double> flux;
-  std::vector<CosineSums>
-      cosines;  // [kCosines × kCosines] or empty: of the metal's facets, times flux
+  // The same times Lagrange's polynomials at the metal's facets; empty where nobody asks for it.
+  std::vector<CosineSums> cosines;
 };
-Between ReflectedBetweenNodes(const Material& material, const Ggx& facets, bool has_cosines) {
+NodeFlux ReflectedBetweenNodes(const Material& material, const Ggx& facets, bool has_cosines) {
   constexpr std::size_t kCosines = CoatTable::kCosines;
-  Between reflected;
+  NodeFlux reflected;
   reflected.flux.resize(kCosines * kCosines);
   if (has_cosines) reflected.cosines.resize(kCosines * kCosines);
   const double of_turn = 1.0 / TurnsOf(material);
@@ -418,7 +418,7 @@ void AddMeetings(const std::array<double, CoatTable::kHits + 1>& shares, const N
 
 // Fills CoatTable::once_cosines: numbers of the two directions, d(w) + d(w'), whose mean over what
 // the first term brings of each direction is what the walks' mean differs by from the lobe's.
-void AddOnce(const Between& reflected, const std::vector<NodeCosines>& walked, CoatTable& table) {
+void AddOnce(const NodeFlux& reflected, const std::vector<NodeCosines>& walked, CoatTable& table) {
   constexpr std::size_t kCosines = CoatTable::kCosines;
   constexpr int kRounds = 64;
   // Over azimuths a mean, up to a factor.
@@ -481,7 +481,7 @@ void AddResidual(const Material& material, CoatTable& table) {
   // that of the walk. Half of the error goes to each of its two occurrences.
   // Where E is the same for all azimuths, sums over nodes are the averages over facets.
   const bool has_nodes = table.rows == 1 && !table.entering.empty();
-  Between reflected;
+  NodeFlux reflected;
   if (!HasNoFacets(material))
     reflected = ReflectedBetweenNodes(material, BaseFacets(material), !material.HasHaze());
   const auto met_once = [&](int i) {

@@ -7,7 +7,6 @@
 #include "render/formats/wavelength_color.h"
 
 namespace lucerna {
-
 namespace {
 
 float Held(float value) {
