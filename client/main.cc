@@ -34,6 +34,7 @@
 #include "client/usage.h"
 #include "client/view/preview.h"
 #include "client/view/tev_view.h"
+#include "client/view_flags.h"
 #include "render/base/console.h"
 #include "render/base/escape.h"
 #include "render/base/open_ssl.h"
@@ -198,8 +199,10 @@ int Run(int argc, char** argv) {
         ->allow_extra_args(false);
   };
   const auto add_scene = [&](CLI::App* to, SceneSource& source) {
-    to->add_option("SCENE", source.path, "scene file: pbrt-v4, glTF 2.0 or Mitsuba")->required();
+    to->add_option("SCENE", source.path, "scene file: pbrt-v4, glTF 2.0, Mitsuba or .view.json")
+        ->required();
     add_allowed(to, source);
+    AddEnvironmentFlags(*to, source.view);
   };
   const auto add_display = [&](CLI::App* to) {
     to->add_option_function<std::string>(
@@ -242,6 +245,8 @@ int Run(int argc, char** argv) {
                    "frame")
         ->required();
     add_allowed(to, request.scene);
+    AddCameraFlags(*to, request.scene.view);
+    AddEnvironmentFlags(*to, request.scene.view);
     to->add_option("--frames", frames, "numbers of frames, like 1-24 or 1,5,8-10");
     add_outputs(to, request.outputs);
     to->add_option_function<std::string>(
@@ -444,6 +449,7 @@ int Run(int argc, char** argv) {
   CLI::App* validate = command("validate", "say what is wrong with a scene",
                                [&] { return Validate(scene, strict, output_options); });
   add_scene(validate, scene);
+  AddCameraFlags(*validate, scene.view);
   validate->add_flag("--strict", strict, "warnings are errors");
   add_json(validate);
   add_quiet(validate);
@@ -451,6 +457,7 @@ int Run(int argc, char** argv) {
   CLI::App* plan = command("plan", "say what a job will use, what is left out, and why",
                            [&] { return PrintPlan(scene, planned, output_options); });
   add_scene(plan, scene);
+  AddCameraFlags(*plan, scene.view);
   add_image_flags(plan, planned);
   add_json(plan);
   add_quiet(plan);

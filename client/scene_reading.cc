@@ -35,14 +35,30 @@ ScenePath SplitScenePath(const std::string& path) {
 }
 
 DirectoryFiles FilesOf(const SceneSource& source) {
-  return DirectoryFiles(SplitScenePath(source.path).folder, {}, source.allowed_folders);
+  const ScenePath place = SplitScenePath(source.path);
+  DirectoryFiles files(place.folder, {}, source.allowed_folders);
+  if (source.view.IsEmpty()) return files;
+  SceneView view = source.view;
+  if (!view.environment.empty()) {
+    // The path on this machine is not sent.
+    const std::string name = Concat(".view/", SplitScenePath(view.environment).main);
+    files.AddFromDisk(name, std::exchange(view.environment, name));
+  }
+  files.Add(MainFileOf(source), ViewFile(place.main, view));
+  return files;
+}
+
+std::string MainFileOf(const SceneSource& source) {
+  const std::string main = SplitScenePath(source.path).main;
+  return source.view.IsEmpty() ? main : Concat(main, kViewExtension);
 }
 
 Status CheckNamesFile(const std::string& path) {
   if (!path.empty() && !path.ends_with('/')) return absl::OkStatus();
   return Failure(
       ExitCode::kUsage,
-      absl::StrCat("\"", path, "\" is not a scene file; name its .pbrt, .gltf, .glb or .xml file"));
+      absl::StrCat("\"", path,
+                   "\" is not a scene file; name its .pbrt, .gltf, .glb, .xml or .view.json file"));
 }
 
 StatusOr<SceneManifest> ReadScene(const SceneSource& source, const RenderOverrides& overrides,
@@ -56,9 +72,9 @@ StatusOr<SceneOfJobs> ReadSceneOfJobs(const SceneSource& source,
                                       Scene* scene) {
   const std::string& path = source.path;
   LUCERNA_RETURN_IF_ERROR(CheckNamesFile(path));
-  const ScenePath place = SplitScenePath(path);
+  const std::string main_file = MainFileOf(source);
   DirectoryFiles files = FilesOf(source);
-  ParsedScene parsed = ReadScene(files, place.main);
+  ParsedScene parsed = ReadScene(files, main_file);
   std::size_t errors = 0;
   for (const Diagnostic& diagnostic : parsed.diagnostics) {
     const bool is_error = diagnostic.severity == Diagnostic::Severity::kError;
@@ -80,7 +96,7 @@ StatusOr<SceneOfJobs> ReadSceneOfJobs(const SceneSource& source,
     read.settings.push_back(*settings);
   }
   if (!quiet) WarnOfUnused(overrides, read.settings);
-  read.manifest = files.Manifest(place.main);
+  read.manifest = files.Manifest(main_file);
   if (scene != nullptr) *scene = std::move(parsed.scene);
   return read;
 }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "render/formats/read_scene.h"
+#include "render/formats/view/view_reader.h"
 #include "render/scene/render_settings.h"
 #include "render/scene/scene_files.h"
 
@@ -20,13 +21,17 @@ struct ScenePath {
 
 [[nodiscard]] ScenePath SplitScenePath(const std::string& path);
 
-// A scene on this machine, and the folders outside its own from which it may read.
+// A scene on this machine, the folders outside its own from which it may read, and what takes the
+// place of its camera and sky.
 struct SceneSource {
   std::string path;
   std::vector<std::string> allowed_folders = {};
+  SceneView view = {};  // `environment` is a path from the current folder
 };
 
 [[nodiscard]] DirectoryFiles FilesOf(const SceneSource& source);
+// The logical path of the main file: with a view, that of a file that FilesOf adds.
+[[nodiscard]] std::string MainFileOf(const SceneSource& source);
 
 // Errors: Failure(kUsage) when `path` is empty or ends as only a folder's does.
 [[nodiscard]] Status CheckNamesFile(const std::string& path);

@@ -15,7 +15,9 @@ namespace {
 TextureDetail PictureDetail(const AreaLight& light) {
   Texture texture;
   texture.kind = Texture::Kind::kPicture;
-  texture.wrap_u = texture.wrap_v = Texture::Wrap::kClamp;
+  texture.mapping = light.mapping;
+  texture.wrap_u = light.wrap_u;
+  texture.wrap_v = light.wrap_v;
   texture.picture = light.picture;
   if (light.largest_pixel > 0) texture.scale = 1 / light.largest_pixel;
   return TextureDetails({texture}).front();

@@ -36,12 +36,12 @@ StatusOr<Image> ReadImage(const std::string& path) {
 Status Validate(const SceneSource& source, bool strict, const OutputOptions& output_options) {
   const std::string& scene_path = source.path;
   LUCERNA_RETURN_IF_ERROR(CheckNamesFile(scene_path));
-  const ScenePath place = SplitScenePath(scene_path);
+  const std::string main_file = MainFileOf(source);
   DirectoryFiles files = FilesOf(source);
   // A program gets them all, up to what fits in memory.
   constexpr std::size_t kMaxForPrograms = 1'000'000;
   const ParsedScene parsed = ReadScene(
-      files, place.main, {}, output_options.json ? kMaxForPrograms : Diagnostics::kMaxOfEach);
+      files, main_file, {}, output_options.json ? kMaxForPrograms : Diagnostics::kMaxOfEach);
   std::array<std::size_t, 3> counts{};
   for (const Diagnostic& diagnostic : parsed.diagnostics) {
     ++counts[static_cast<std::size_t>(diagnostic.severity)];

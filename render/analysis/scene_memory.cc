@@ -30,6 +30,11 @@ constexpr double kTreeInstance = 430;
 constexpr double kBuildingPrimitive = 36;  // beside the tree
 // Of the set of lights, with the tree of those that are sampled, and while that is made.
 constexpr double kEmitter = 320;
+// Of an emitter that shows a picture: the distribution of places on it, with and without its cells,
+// of which all emitters have so many (transport/light.cc).
+constexpr double kSpread = 320;
+constexpr double kSpreadCells = 4.0 * (1 << 22);
+constexpr double kSpreadCellsOfOne = 4.0 * (1 << 16);
 // Of feature edges: a segment, with the tree; and while they are found.
 constexpr double kSegment = 52;
 constexpr double kEdgesPerTriangle = 77, kEdgesPerVertex = 28, kEdgesPerMesh = 24;
@@ -52,7 +57,8 @@ double SizeOf(const TriangleMesh& mesh) {
   return sizeof(TriangleMesh) + 4 * kAllocation +
          static_cast<double>(mesh.positions.size() * sizeof(Vec3) +
                              mesh.indices.size() * sizeof(std::uint32_t) +
-                             mesh.normals.size() * sizeof(Vec3) + mesh.uvs.size() * sizeof(Vec2));
+                             mesh.normals.size() * sizeof(Vec3) + mesh.uvs.size() * sizeof(Vec2) +
+                             mesh.colors.size() * sizeof(Rgb));
 }
 
 // How many edges belong to one triangle alone, by Euler's formula for surfaces of one piece: exact
@@ -85,6 +91,11 @@ SceneMemory SceneMemoryOf(const Scene& scene, const RayNeeds& rays) {
   const double tree = rays.split_triangles ? kSplitTreePrimitive : kTreePrimitive;
   double open_edges = 0;
   double primitives = 0;
+  double spreads = 0;
+  const auto shows_picture = [&](const ShapeTraits& traits) {
+    return traits.area_light != kNoAreaLight &&
+           scene.area_lights[static_cast<std::size_t>(traits.area_light)].picture != nullptr;
+  };
   for (const auto* list : {&scene.meshes, &scene.object_meshes}) {
     for (const TriangleMesh& mesh : *list) {
       const auto triangles = static_cast<double>(mesh.indices.size()) / 3;
@@ -109,6 +120,7 @@ SceneMemory SceneMemoryOf(const Scene& scene, const RayNeeds& rays) {
       memory.analysing += (kAnalysisPerTriangle + (is_open ? 0 : kAnalysisOfClosed)) * triangles +
                           kAnalysisPerVertex * vertices + kAnalysisPerMesh;
       if (mesh.traits.area_light >= 0) memory.lights += kEmitter * triangles;
+      if (shows_picture(mesh.traits)) spreads += triangles;
     }
   }
   ForEachAnalyticList(scene, [&](const auto& list) {
@@ -130,6 +142,9 @@ SceneMemory SceneMemoryOf(const Scene& scene, const RayNeeds& rays) {
   ForEachDeltaList(scene, [&](const auto& lights) {
     if (!lights.empty()) memory.lights += static_cast<double>(lights.size()) * kEmitter;
   });
+  ForEachAnalyticShape(scene,
+                       [&](const auto& shape) { spreads += shows_picture(shape.traits) ? 1 : 0; });
+  memory.lights += kSpread * spreads + std::min(kSpreadCellsOfOne * spreads, kSpreadCells);
   if (scene.motion.Moves()) {
     for (const TriangleMesh& mesh : scene.meshes) {
       if (mesh.traits.motion != kNoMotion) memory.moving += SizeOf(mesh);
@@ -168,6 +183,12 @@ SceneMemory SceneMemoryOf(const Scene& scene, const RayNeeds& rays) {
   for (const Texture& texture : scene.textures)
     add(texture.picture);
   for (const InfiniteLight& light : scene.infinite_lights)
+    add(light.map);
+  for (const AreaLight& light : scene.area_lights)
+    add(light.picture);
+  for (const GoniometricLight& light : scene.goniometric_lights)
+    add(light.map);
+  for (const ProjectionLight& light : scene.projection_lights)
     add(light.map);
   return memory;
 }

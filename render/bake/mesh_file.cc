@@ -116,13 +116,13 @@ class NoFiles final : public SceneFiles {
 };
 
 // One primitive. False: an error, which is in the diagnostics.
-bool ReadSurface(const GltfObject& primitive, GltfBuffers& buffers, BakedMesh::Surface& surface) {
-  const GltfObject attributes = primitive.Child("attributes");
+bool ReadSurface(const JsonObject& primitive, GltfBuffers& buffers, BakedMesh::Surface& surface) {
+  const JsonObject attributes = primitive.Child("attributes");
   if (!attributes.Has("_IRRADIANCE")) {
     primitive.Error("has no attribute _IRRADIANCE; give a file that lucerna bake has written");
     return false;
   }
-  const auto open = [&](const GltfObject& object, const char* name,
+  const auto open = [&](const JsonObject& object, const char* name,
                         GltfUse use) -> const GltfAccessor* {
     const std::optional<std::size_t> index = object.Index(name, "accessors");
     if (!index) {
@@ -364,13 +364,13 @@ StatusOr<BakedMesh> ReadMeshGlb(const std::string& path, std::string_view bytes)
   BakedMesh mesh;
   if (document.is_readable()) {
     GltfBuffers buffers(document, assets);
-    const GltfObject extras = document.Root().Child("extras");
+    const JsonObject extras = document.Root().Child("extras");
     mesh.scene = extras.String("scene", "");
     mesh.is_indirect = extras.Bool("indirect_only", false);
     mesh.is_quadratic = extras.String("elements", kLinearElements) == kQuadraticElements;
     for (std::size_t i = 0; i < document.Count("meshes"); ++i) {
-      const GltfObject of_mesh = document.At("meshes", i);
-      for (const GltfObject& primitive : of_mesh.Children("primitives")) {
+      const JsonObject of_mesh = document.At("meshes", i);
+      for (const JsonObject& primitive : of_mesh.Children("primitives")) {
         BakedMesh::Surface& surface = mesh.surfaces.emplace_back();
         surface.name = of_mesh.String("name", "");
         surface.material = of_mesh.Child("extras").String("material", "");

@@ -9,11 +9,39 @@
 
 namespace lucerna {
 
+Status AssetReader::AddFolder(std::string folder) {
+  // Every one is tried for every file.
+  constexpr std::size_t kMaxFolders = 32;
+  if (folders_.size() >= kMaxFolders)
+    return absl::ResourceExhaustedError(Concat("more than ", kMaxFolders, " folders"));
+  while (folder.starts_with("./"))
+    folder.erase(0, 2);
+  while (folder.ends_with('/'))
+    folder.pop_back();
+  if (!folder.empty() && folder != ".") folders_.push_back(std::move(folder));
+  // A path may name another file from here on.
+  pictures_.clear();
+  return absl::OkStatus();
+}
+
+StatusOr<std::string> AssetReader::ReadFromFolders(const std::string& path) {
+  // Why one of the folders must not be read.
+  Status refused;
+  for (std::size_t i = path.starts_with('/') ? 0 : folders_.size(); i > 0; --i) {
+    StatusOr<std::string> bytes = files_.Read(Concat(folders_[i - 1], "/", path));
+    if (bytes.ok()) return bytes;
+    if (refused.ok() && !absl::IsNotFound(bytes.status())) refused = bytes.status();
+  }
+  StatusOr<std::string> bytes = files_.Read(path);
+  if (refused.ok() || !absl::IsNotFound(bytes.status())) return bytes;
+  return refused;
+}
+
 StatusOr<std::string> AssetReader::ReadBytes(const std::string& path) {
   std::string normal_path = path;
   while (normal_path.starts_with("./"))
     normal_path.erase(0, 2);
-  LUCERNA_ASSIGN_OR_RETURN(std::string bytes, files_.Read(normal_path));
+  LUCERNA_ASSIGN_OR_RETURN(std::string bytes, ReadFromFolders(normal_path));
   bytes_read_ += bytes.size();
   if (!is_over_limit()) return bytes;
   return absl::ResourceExhaustedError(
@@ -32,9 +60,9 @@ StatusOr<std::string> AssetReader::ReadText(const std::string& path) {
       Concat("the scene reads more than ", limits_.max_total_bytes, " bytes"));
 }
 
-StatusOr<TriangleMesh> AssetReader::ReadMesh(const std::string& path) {
+StatusOr<TriangleMesh> AssetReader::ReadMesh(const std::string& path, PlyFaces* faces) {
   LUCERNA_ASSIGN_OR_RETURN(const std::string bytes, ReadBytes(path));
-  StatusOr<TriangleMesh> mesh = ParsePly(bytes);
+  StatusOr<TriangleMesh> mesh = ParsePly(bytes, faces);
   if (mesh.ok()) return mesh;
   return absl::InvalidArgumentError(Concat(path, ": ", mesh.status().message()));
 }

@@ -10,6 +10,7 @@
 #include <memory>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "render/base/status.h"
 #include "render/formats/image_file.h"
@@ -19,18 +20,23 @@
 
 namespace lucerna {
 
+struct PlyFaces;
+
 class AssetReader {
  public:
   // `files` outlives the reader.
   AssetReader(SceneFiles& files, const SceneLimits& limits) : files_(files), limits_(limits) {}
 
+  // From now on files are also looked for in this folder of the scene, before those that were added
+  // earlier and before the main file's. Errors: RESOURCE_EXHAUSTED for too many.
+  [[nodiscard]] Status AddFolder(std::string folder);
   // The bytes of a file. Errors: what `files` says, RESOURCE_EXHAUSTED beyond the limits.
   [[nodiscard]] StatusOr<std::string> ReadBytes(const std::string& path);
   // The text of a file, unpacked when it is packed by gzip. Errors: those of ReadBytes, and
   // INVALID_ARGUMENT for a damaged stream, with the path.
   [[nodiscard]] StatusOr<std::string> ReadText(const std::string& path);
   // Errors: those of ReadBytes and of the file's format, with the path.
-  [[nodiscard]] StatusOr<TriangleMesh> ReadMesh(const std::string& path);
+  [[nodiscard]] StatusOr<TriangleMesh> ReadMesh(const std::string& path, PlyFaces* faces = nullptr);
   [[nodiscard]] StatusOr<std::shared_ptr<const Picture>> ReadPicture(
       const std::string& path, const PixelEncoding& encoding, PictureUse use = PictureUse::kColors);
   // A PNG or JPEG, by how its bytes begin, that a file holds within it or names by its own rules.
@@ -55,6 +61,8 @@ class AssetReader {
     std::shared_ptr<const Picture> picture;
   };
 
+  // In the folders that were added, then as the path says.
+  [[nodiscard]] StatusOr<std::string> ReadFromFolders(const std::string& path);
   [[nodiscard]] std::shared_ptr<const Picture> FindPicture(const std::string& path,
                                                            const PixelEncoding& encoding,
                                                            PictureUse use) const;
@@ -67,6 +75,7 @@ class AssetReader {
 
   SceneFiles& files_;
   const SceneLimits limits_;
+  std::vector<std::string> folders_;
   std::uint64_t bytes_read_ = 0;
   std::uint64_t picture_bytes_ = 0;
   std::multimap<std::string, KnownPicture> pictures_;                     // by path or name

@@ -1,10 +1,13 @@
 #include "render/formats/finish_scene.h"
 
 #include <algorithm>
+#include <array>
 #include <cfloat>
 #include <cmath>
 #include <cstdint>
 #include <map>
+#include <numbers>
+#include <optional>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -67,6 +70,7 @@ void WarnOfMissingUvs(const Scene& scene, const SourceLocation& whole, Diagnosti
       is_textured =
           is_textured || scene.area_lights[static_cast<std::size_t>(light)].picture != nullptr;
     }
+    is_textured = is_textured || IsPlacedByUv(scene, mesh.traits.alpha_texture);
     if (mesh.uvs.empty() && is_textured) {
       diagnostics.Warning(whole,
                           "a mesh with a texture has no uv: every triangle shows half of it");
@@ -95,6 +99,57 @@ void WarnOfEmptiness(const Scene& scene, const SourceLocation& whole, Diagnostic
   }
 }
 
+// A camera that sees all shapes of a right-handed scene, from the front and a little from above.
+void FrameWholeScene(Scene& scene) {
+  constexpr double kFovDeg = 40;
+  constexpr double kMargin = 1.05;
+  // +z is the front of a glTF model, +y is up.
+  constexpr std::array kFrom = {0.4, 0.3, 1.0};
+  const Bounds box = BoundsOf(scene);
+  const Vec3 center = box.Center();
+  const double diagonal = static_cast<double>(box.Diagonal());
+  const double radius = diagonal > 0 ? diagonal / 2 : 1;
+  const double distance = kMargin * radius / std::sin(kFovDeg / 2 * std::numbers::pi / 180) /
+                          std::hypot(kFrom[0], kFrom[1], kFrom[2]);
+  const std::array<double, 3> look = {static_cast<double>(center.x), static_cast<double>(center.y),
+                                      static_cast<double>(center.z)};
+  const std::array<double, 3> eye = {look[0] + distance * kFrom[0], look[1] + distance * kFrom[1],
+                                     look[2] + distance * kFrom[2]};
+  const StatusOr<Transform> to_camera = Transform::LookAt(eye, look, {0, 1, 0});
+  scene.camera.fov_deg = kFovDeg;
+  if (!to_camera.ok()) return;
+  // LookAt makes the left-handed camera of pbrt, whose image of a right-handed scene is mirrored.
+  const StatusOr<Transform> to_world = to_camera->Inverse();
+  if (to_world.ok()) scene.camera.camera_to_world = *to_world * Transform::Scale(-1, 1, 1);
+}
+
+void AddMissingView(UnfinishedScene& unfinished, const SourceLocation& whole,
+                    Diagnostics& diagnostics) {
+  Scene& scene = unfinished.scene;
+  if (!unfinished.has_camera) {
+    if (ShapeCount(scene) + scene.instances.size() == 0) {
+      diagnostics.Error(
+          whole, "the file has no triangles: points, lines and empty nodes are not rendered");
+      return;
+    }
+    FrameWholeScene(scene);
+    unfinished.has_camera = true;
+    diagnostics.Warning(whole,
+                        "the file has no camera: one is added that sees the whole scene from the "
+                        "front; add a camera, or say where it is, to choose the view");
+  }
+  // An image that shines is more often a display on what is shown than what lights it.
+  const bool has_emitter = std::ranges::any_of(
+      scene.area_lights, [](const AreaLight& light) { return light.picture == nullptr; });
+  if (has_emitter || DeltaLightCount(scene) > 0 || !scene.infinite_lights.empty()) return;
+  scene.infinite_lights.push_back({Gray(1)});
+  diagnostics.Warning(
+      whole, Concat(scene.area_lights.empty() ? "the file has no light: "
+                                              : "the file has no light but images: ",
+                    "an even sky of radiance 1 is added; add lights (KHR_lights_punctual) or "
+                    "emissive materials, or name an environment"));
+}
+
 // Of triangles that have no area in the scene's own unit.
 void DropFlatTriangles(UnfinishedScene& unfinished, const SourceLocation& whole,
                        Diagnostics& diagnostics) {
@@ -110,6 +165,18 @@ void DropFlatTriangles(UnfinishedScene& unfinished, const SourceLocation& whole,
   if (dropped > 0) {
     diagnostics.Note(whole, Concat(dropped, dropped == 1 ? " triangle has" : " triangles have",
                                    " no area in single precision and are dropped"));
+  }
+}
+
+// Colours of vertices that no texture shows are memory alone.
+void DropUnusedColors(Scene& scene) {
+  const auto shows = [](const Texture& texture) {
+    return texture.kind == Texture::Kind::kVertexColor;
+  };
+  if (std::ranges::any_of(scene.textures, shows)) return;
+  for (std::vector<TriangleMesh>* const meshes : {&scene.meshes, &scene.object_meshes}) {
+    for (TriangleMesh& mesh : *meshes)
+      mesh.colors = {};
   }
 }
 
@@ -169,6 +236,35 @@ void ForgetMedia(Scene& scene) {
   });
 }
 
+// The medium outside of everything, as far as the scene's file says so; kNoMedium where shapes
+// disagree.
+std::int32_t OutermostMedium(const Scene& scene) {
+  std::optional<std::int32_t> outermost;
+  if (scene.camera.medium != kNoMedium) outermost = scene.camera.medium;
+  bool is_same = true;
+  ForEachShapeTraits(scene, [&](const ShapeTraits& traits) {
+    if (!traits.SeparatesMedia()) return;
+    if (!outermost.has_value()) outermost = traits.medium_outside;
+    is_same = is_same && traits.medium_outside == *outermost;
+  });
+  return is_same ? outermost.value_or(kNoMedium) : kNoMedium;
+}
+
+void WarnOfEndlessMedium(const Scene& scene, const SourceLocation& whole,
+                         Diagnostics& diagnostics) {
+  if (scene.infinite_lights.empty() && scene.distant_lights.empty()) return;
+  const std::int32_t outermost = OutermostMedium(scene);
+  if (outermost == kNoMedium) return;
+  const Medium& medium = scene.media[static_cast<std::size_t>(outermost)];
+  const Rgb extinction = medium.Extinction();
+  // A grid has an end.
+  if (medium.density != nullptr || !(std::min({extinction.r, extinction.g, extinction.b}) > 0))
+    return;
+  diagnostics.Warning(whole, Concat("the medium ", Quoted(medium.name),
+                                    " around the scene has no end: light of infinite and "
+                                    "distant lights does not get through it"));
+}
+
 // A disc of photons is many times as wide as a hair, of which it would hold next to nothing: on
 // thin shapes eye paths go on, and direct light is sampled, as on surfaces with narrow lobes.
 void StopGatheringOnThinShapes(Scene& scene) {
@@ -192,13 +288,19 @@ Scene FinishScene(UnfinishedScene unfinished, const std::string& main_file,
   Scene& scene = unfinished.scene;
   if (diagnostics.has_error()) return std::move(scene);
   const SourceLocation whole = {&main_file, 0, 0};
+  if (unfinished.is_object) AddMissingView(unfinished, whole, diagnostics);
+  if (diagnostics.has_error()) return std::move(scene);
   BeginMotion(scene, whole, diagnostics);
   JoinMixes(scene.materials);
   WarnOfMissingUvs(scene, whole, diagnostics);
   WarnOfDistance(scene, whole, diagnostics);
   for (std::string& message : unfinished.missing)
     diagnostics.Error(whole, std::move(message));
-  if (!unfinished.has_camera) diagnostics.Error(whole, "the scene has no camera");
+  if (!unfinished.has_camera && !unfinished.without_camera.empty()) {
+    diagnostics.Warning(whole, std::move(unfinished.without_camera));
+  } else if (!unfinished.has_camera) {
+    diagnostics.Error(whole, "the scene has no camera");
+  }
   WarnOfEmptiness(scene, whole, diagnostics);
   if (const Status chosen = ChooseUnit(scene); !chosen.ok()) {
     diagnostics.Error(whole, std::string(chosen.message()));
@@ -206,6 +308,8 @@ Scene FinishScene(UnfinishedScene unfinished, const std::string& main_file,
   DropFlatTriangles(unfinished, whole, diagnostics);
   DropInterfacesWithinMedia(scene, whole, diagnostics);
   if (!UsesMedia(scene)) ForgetMedia(scene);
+  DropUnusedColors(scene);
+  WarnOfEndlessMedium(scene, whole, diagnostics);
   StopGatheringOnThinShapes(scene);
   // Of copies for thin shapes.
   JoinMixes(scene.materials);

@@ -26,6 +26,11 @@ struct UnfinishedScene {
   // Sentences about what the format requires and the file does not have.
   std::vector<std::string> missing;
   bool has_camera = false;
+  // Of a format in which the scene's camera stands for one that is missing: the warning to give.
+  std::string without_camera;
+  // Of a format whose files are often an object alone: a camera that sees all of it, and an even
+  // sky, are added where there is none.
+  bool is_object = false;
   std::vector<EmittingMesh> emitting_meshes;
 };
 

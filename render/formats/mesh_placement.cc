@@ -39,7 +39,7 @@ Double3 EdgeCross(const TriangleMesh& mesh, std::size_t triangle) {
 std::uint64_t SizeBytes(const TriangleMesh& mesh) {
   return sizeof(mesh) + mesh.positions.size() * sizeof(Vec3) +
          mesh.indices.size() * sizeof(std::uint32_t) + mesh.normals.size() * sizeof(Vec3) +
-         mesh.uvs.size() * sizeof(Vec2);
+         mesh.uvs.size() * sizeof(Vec2) + mesh.colors.size() * sizeof(Rgb);
 }
 
 }  // namespace lucerna

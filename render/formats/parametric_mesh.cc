@@ -78,6 +78,18 @@ Double3 Mix(const std::array<Double3, 4>& corners, double u, double v) {
          corners[2] * ((1 - u) * v) + corners[3] * (u * v);
 }
 
+std::array<Double3, 4> CornersOf(const BilinearPatch& patch) {
+  std::array<Double3, 4> corners;
+  for (std::size_t i = 0; i < 4; ++i)
+    corners[i] = Double3(patch.corners[i]);
+  return corners;
+}
+
+// What a parallelogram does not have.
+Double3 TwistOf(const std::array<Double3, 4>& p) {
+  return p[0] - p[1] - p[2] + p[3];
+}
+
 }  // namespace
 
 TriangleMesh SphereMesh(double radius, double z_min, double z_max, double phi_max_rad) {
@@ -136,14 +148,15 @@ TriangleMesh CylinderMesh(double radius, double z_min, double z_max, double phi_
 
 void AddBilinearPatch(const BilinearPatch& patch, const std::array<Vec3, 4>* normals,
                       TriangleMesh& mesh) {
-  std::array<Double3, 4> p;
-  for (std::size_t i = 0; i < 4; ++i)
-    p[i] = Double3(patch.corners[i]);
-  // What a parallelogram does not have.
-  const Double3 twist = p[0] - p[1] - p[2] + p[3];
+  const std::array<Double3, 4> p = CornersOf(patch);
   const double size = Length(p[3] - p[0]) + Length(p[2] - p[1]);
-  const bool is_flat = Length(twist) <= 1e-6 * size;
-  const int sides = is_flat ? 1 : kPatchSides;
+  const bool is_flat = Length(TwistOf(p)) <= 1e-6 * size;
+  AddBilinearPatch(patch, normals, is_flat ? 1 : kPatchSides, mesh);
+}
+
+void AddBilinearPatch(const BilinearPatch& patch, const std::array<Vec3, 4>* normals, int sides,
+                      TriangleMesh& mesh) {
+  const std::array<Double3, 4> p = CornersOf(patch);
   std::array<Double3, 4> n;
   if (normals != nullptr) {
     for (std::size_t i = 0; i < 4; ++i)
@@ -168,6 +181,20 @@ void AddBilinearPatch(const BilinearPatch& patch, const std::array<Vec3, 4>* nor
                          {uv(&Vec2::x), uv(&Vec2::y)}};
       },
       mesh);
+}
+
+int FewestPatchSides(const BilinearPatch& patch) {
+  constexpr double kLargestError = 0.005;
+  const std::array<Double3, 4> p = CornersOf(patch);
+  const Double3 one = p[3] - p[0];
+  const Double3 other = p[2] - p[1];
+  const Double3 across = Cross(one, other);
+  const double diagonal = (Length(one) + Length(other)) / 2;
+  if (!(Length(across) > 0) || !(diagonal > 0)) return 1;
+  // A cell of a grid leaves its triangles by a quarter of its twist, a share of that of the patch.
+  const double twist = std::abs(Dot(TwistOf(p), across)) / Length(across);
+  const double sides = std::ceil(std::sqrt(twist / (4 * kLargestError * diagonal)));
+  return static_cast<int>(std::clamp(sides, 1.0, static_cast<double>(kPatchSides)));
 }
 
 }  // namespace lucerna

@@ -41,5 +41,11 @@ struct BilinearPatch {
 // Appends it to a mesh with normals and texture coordinates.
 void AddBilinearPatch(const BilinearPatch& patch, const std::array<Vec3, 4>* normals,
                       TriangleMesh& mesh);
+// The same as 2 × sides × sides triangles.
+void AddBilinearPatch(const BilinearPatch& patch, const std::array<Vec3, 4>* normals, int sides,
+                      TriangleMesh& mesh);
+// The fewest `sides`, 16 at most, with which triangles leave the surface by 0.5 % of its mean
+// diagonal at most; 1 where it lies in a plane, whatever its texture coordinates do.
+[[nodiscard]] int FewestPatchSides(const BilinearPatch& patch);
 
 }  // namespace lucerna

@@ -265,8 +265,7 @@ class Body {
   bool is_malformed_ = false;
 };
 
-void SkipList(Body& body, Format format, const Property& property) {
-  const double count = body.Read(property.count_type);
+void SkipValues(Body& body, Format format, const Property& property, double count) {
   if (!(count >= 0)) return;
   if (format != Format::kAscii) {
     body.Skip(static_cast<std::uint64_t>(count) * SizeOf(property.type));
@@ -274,6 +273,11 @@ void SkipList(Body& body, Format format, const Property& property) {
   }
   for (double i = 0; i < count && body.ok(); ++i)
     body.Read(property.type);
+}
+
+void SkipList(Body& body, Format format, const Property& property) {
+  const double count = body.Read(property.count_type);
+  SkipValues(body, format, property, count);
 }
 
 Status Broken(const Body& body, const Element& element, std::uint64_t index) {
@@ -298,6 +302,10 @@ class Rows {
 
   [[nodiscard]] bool Has(std::initializer_list<std::size_t> columns) const {
     return std::ranges::all_of(columns, [&](std::size_t column) { return there_[column]; });
+  }
+  [[nodiscard]] bool IsByte(std::string_view name) const {
+    const auto property = std::ranges::find(element_.properties, name, &Property::name);
+    return property != element_.properties.end() && property->type == Scalar::kUint8;
   }
   [[nodiscard]] Status Next(std::uint64_t row) {
     for (std::size_t i = 0; i < columns_.size(); ++i) {
@@ -325,10 +333,17 @@ class Rows {
   std::vector<float> values_;
 };
 
+// Of a byte that is coded by sRGB's curve.
+float LinearOf(float byte) {
+  const float coded = byte / 255;
+  return coded <= 0.04045F ? coded / 12.92F : std::pow((coded + 0.055F) / 1.055F, 2.4F);
+}
+
 Status ReadVertices(Body& body, Format format, const Element& element, TriangleMesh& mesh,
                     std::vector<float>* spacings = nullptr) {
-  constexpr std::array<std::string_view, 11> kColumns = {"x", "y", "z", "nx", "ny",     "nz",
-                                                         "u", "v", "s", "t",  "spacing"};
+  constexpr std::array<std::string_view, 17> kColumns = {"x", "y", "z",   "nx",    "ny",      "nz",
+                                                         "u", "v", "s",   "t",     "spacing", "r",
+                                                         "g", "b", "red", "green", "blue"};
   Rows rows(body, format, element, kColumns);
   if (!rows.Has({0, 1, 2})) return Bad("its vertices have no x, y and z");
   const bool has_normals = rows.Has({3, 4, 5});
@@ -338,6 +353,11 @@ Status ReadVertices(Body& body, Format format, const Element& element, TriangleM
   mesh.positions.resize(element.count);
   if (has_uv || has_st) mesh.uvs.resize(element.count);
   if (has_normals) mesh.normals.resize(element.count);
+  // Numbers, as Mitsuba writes them, or bytes, which are coded as those of images are.
+  const bool has_rgb = rows.Has({11, 12, 13});
+  const bool has_bytes = !has_rgb && rows.Has({14, 15, 16}) && rows.IsByte("red") &&
+                         rows.IsByte("green") && rows.IsByte("blue");
+  if (has_rgb || has_bytes) mesh.colors.resize(element.count);
   if (has_spacings) spacings->resize(element.count);
   for (std::uint64_t vertex = 0; vertex < element.count; ++vertex) {
     LUCERNA_RETURN_IF_ERROR(rows.Next(vertex));
@@ -352,6 +372,12 @@ Status ReadVertices(Body& body, Format format, const Element& element, TriangleM
     if (has_uv || has_st) {
       const Vec2 uv = has_uv ? Vec2{rows[6], rows[7]} : Vec2{rows[8], rows[9]};
       mesh.uvs[vertex] = std::isfinite(uv.x) && std::isfinite(uv.y) ? uv : Vec2();
+    }
+    if (has_rgb) {
+      const auto held = [](float channel) { return channel > 0 ? std::min(channel, 1.0F) : 0.0F; };
+      mesh.colors[vertex] = {held(rows[11]), held(rows[12]), held(rows[13])};
+    } else if (has_bytes) {
+      mesh.colors[vertex] = {LinearOf(rows[14]), LinearOf(rows[15]), LinearOf(rows[16])};
     }
     if (has_spacings) (*spacings)[vertex] = rows[10];
   }
@@ -374,7 +400,8 @@ Status ReadSegments(Body& body, Format format, const Element& element,
   return absl::OkStatus();
 }
 
-Status ReadFaces(Body& body, Format format, const Element& element, TriangleMesh& mesh) {
+Status ReadFaces(Body& body, Format format, const Element& element, TriangleMesh& mesh,
+                 PlyFaces& faces) {
   const auto is_corners = [](const Property& property) {
     return property.is_list &&
            (property.name == "vertex_indices" || property.name == "vertex_index");
@@ -396,9 +423,12 @@ Status ReadFaces(Body& body, Format format, const Element& element, TriangleMesh
       }
       const double count = body.Read(property.count_type);
       if (!body.ok()) return Broken(body, element, face);
+      if (count < 0 || count != std::floor(count))
+        return Bad(Concat("face ", face, " has ", count, " corners"));
       if (count != 3 && count != 4) {
-        return Bad(Concat("face ", face, " has ", count,
-                          " corners; only triangles and quadrangles are supported"));
+        SkipValues(body, format, property, count);
+        ++faces.skipped;
+        continue;
       }
       std::array<std::uint32_t, 4> corner{};
       for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
@@ -411,6 +441,7 @@ Status ReadFaces(Body& body, Format format, const Element& element, TriangleMesh
         }
         corner[i] = static_cast<std::uint32_t>(index);
       }
+      if (count == 4) faces.quads.push_back(mesh.indices.size() / 3);
       mesh.indices.insert(mesh.indices.end(), {corner[0], corner[1], corner[2]});
       if (count == 4) mesh.indices.insert(mesh.indices.end(), {corner[0], corner[2], corner[3]});
     }
@@ -487,7 +518,8 @@ StatusOr<Header> Open(std::string_view& bytes, std::string& unpacked) {
 
 }  // namespace
 
-StatusOr<TriangleMesh> ParsePly(std::string_view bytes) {
+StatusOr<TriangleMesh> ParsePly(std::string_view bytes, PlyFaces* faces) {
+  PlyFaces found;
   std::string unpacked;
   LUCERNA_ASSIGN_OR_RETURN(const Header header, Open(bytes, unpacked));
   TriangleMesh mesh;
@@ -502,12 +534,13 @@ StatusOr<TriangleMesh> ParsePly(std::string_view bytes) {
     } else if (element.name == "face") {
       if (!has_vertices) return Bad("its faces come before its vertices");
       if (std::exchange(has_faces, true)) return Bad("it has two elements face");
-      LUCERNA_RETURN_IF_ERROR(ReadFaces(body, header.format, element, mesh));
+      LUCERNA_RETURN_IF_ERROR(ReadFaces(body, header.format, element, mesh, found));
     } else {
       LUCERNA_RETURN_IF_ERROR(SkipElement(body, header.format, element));
     }
   }
   if (!has_vertices || !has_faces) return Bad("it has no vertices or no faces");
+  if (faces != nullptr) *faces = std::move(found);
   return mesh;
 }
 

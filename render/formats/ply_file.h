@@ -2,6 +2,8 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
+#include <cstdint>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -12,18 +14,23 @@
 
 namespace lucerna {
 
+struct PlyFaces {
+  std::vector<std::size_t> quads;  // of each the first of its two triangles, in order
+  std::uint64_t skipped = 0;       // had neither three nor four corners
+};
+
 // Reads ASCII, binary little-endian and binary big-endian PLY, gzipped or not: vertices with
 // x y z and, when all are there, nx ny nz and texture coordinates (u v or s t); faces as lists of
-// three or four indices (quads are split along their 0-2 diagonal). Other elements and properties
-// are skipped.
+// three or four indices (quads are split along their 0-2 diagonal). Faces with other numbers of
+// corners, other elements and properties are skipped.
 //
 // All come as the file has them, but for normals and texture coordinates that are not finite,
 // which become zero; the caller transforms positions and normals. Traits are left at their
 // defaults. Errors: INVALID_ARGUMENT with what is wrong and, where there is one, the vertex, face
 // or byte: truncated data, counts that the file's size cannot hold (checked before anything is
-// allocated), an index out of range, a position that is not finite, a face with fewer than 3 or
-// more than 4 corners, a decompressed size above 200 times the compressed one.
-[[nodiscard]] StatusOr<TriangleMesh> ParsePly(std::string_view bytes);
+// allocated), an index out of range, a position that is not finite, a decompressed size above 200
+// times the compressed one. `faces` (may be null) becomes what the mesh does not say of them.
+[[nodiscard]] StatusOr<TriangleMesh> ParsePly(std::string_view bytes, PlyFaces* faces = nullptr);
 
 // The vertices of a PLY file that need no faces, segments, and what its comments say.
 struct PlyPoints {

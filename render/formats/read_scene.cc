@@ -15,6 +15,7 @@
 #include "render/formats/mitsuba/mitsuba_reader.h"
 #include "render/formats/pbrt/pbrt_reader.h"
 #include "render/formats/sensors/sensors_reader.h"
+#include "render/formats/view/view_reader.h"
 
 namespace lucerna {
 namespace {
@@ -23,6 +24,7 @@ namespace {
 struct SceneFormat {
   std::string_view name;
   std::string_view extension;
+  SceneLayer layer;
   // Whether a text begins as those of the format do.
   bool (*is_begun_by)(std::string_view text);
   // Reads a main file, whose text is given, and what it includes. `main_path` outlives the
@@ -32,11 +34,13 @@ struct SceneFormat {
 };
 
 constexpr std::array kFormats = {
-    SceneFormat{"pbrt-v4", ".pbrt", &BeginsAsPbrt, &ReadPbrt},
-    SceneFormat{"glTF 2.0", ".gltf", &BeginsAsGltf, &ReadGltf},
-    SceneFormat{"binary glTF 2.0", ".glb", &BeginsAsGltf, &ReadGltf},
-    SceneFormat{"Mitsuba", ".xml", &BeginsAsMitsuba, &ReadMitsuba},
-    SceneFormat{"points to measure irradiance at", ".ply", &BeginsAsSensors, &ReadSensors},
+    SceneFormat{"pbrt-v4", ".pbrt", SceneLayer::kWhole, &BeginsAsPbrt, &ReadPbrt},
+    SceneFormat{"glTF 2.0", ".gltf", SceneLayer::kWhole, &BeginsAsGltf, &ReadGltf},
+    SceneFormat{"binary glTF 2.0", ".glb", SceneLayer::kWhole, &BeginsAsGltf, &ReadGltf},
+    SceneFormat{"Mitsuba", ".xml", SceneLayer::kWhole, &BeginsAsMitsuba, &ReadMitsuba},
+    SceneFormat{"a view of a scene", kViewExtension, SceneLayer::kView, &BeginsAsView, &ReadView},
+    SceneFormat{"points to measure irradiance at", ".ply", SceneLayer::kSensors, &BeginsAsSensors,
+                &ReadSensors},
 };
 
 const SceneFormat* FormatOf(std::string_view path, std::string_view text) {
@@ -59,8 +63,8 @@ std::string NamesOfFormats() {
 
 }  // namespace
 
-UnfinishedScene ReadUnfinishedScene(const std::string& main_path, AssetReader& assets,
-                                    Diagnostics& diagnostics) {
+UnfinishedScene ReadUnfinishedScene(const std::string& main_path, SceneLayer highest,
+                                    AssetReader& assets, Diagnostics& diagnostics) {
   const SourceLocation whole = {&main_path, 0, 0};
   const StatusOr<std::string> text = assets.ReadText(main_path);
   if (!text.ok()) {
@@ -73,6 +77,12 @@ UnfinishedScene ReadUnfinishedScene(const std::string& main_path, AssetReader& a
                       Concat("this is no scene in a format that is read here; ", NamesOfFormats()));
     return {};
   }
+  if (format->layer > highest) {
+    diagnostics.Error(whole, Concat("this is ", format->name,
+                                    ", which another file cannot name as its scene; name one in "
+                                    "another format"));
+    return {};
+  }
   return format->read(main_path, *text, assets, diagnostics);
 }
 
@@ -82,7 +92,8 @@ ParsedScene ReadScene(SceneFiles& files, const std::string& main_path, const Sce
     Diagnostics diagnostics(max_of_each);
     AssetReader assets(files, limits);
     Scene scene =
-        FinishScene(ReadUnfinishedScene(main_path, assets, diagnostics), main_path, diagnostics);
+        FinishScene(ReadUnfinishedScene(main_path, SceneLayer::kSensors, assets, diagnostics),
+                    main_path, diagnostics);
     return {std::move(scene), diagnostics.Take()};
   } catch (const std::bad_alloc&) {
     // What had been read is freed by now.

@@ -16,10 +16,14 @@
 
 namespace lucerna {
 
-// For formats that build on another file. Reads a main file by its own format's reader; after an
-// error in `diagnostics` the scene is not meaningful. `main_path` outlives the diagnostics.
-[[nodiscard]] UnfinishedScene ReadUnfinishedScene(const std::string& main_path, AssetReader& assets,
-                                                  Diagnostics& diagnostics);
+// What a format builds on: a whole scene on no other, the rest on files of the layers before.
+enum class SceneLayer { kWhole, kView, kSensors };
+
+// For formats that build on another file. Reads a main file, of a format of the layer `highest` or
+// one before, by that format's reader; after an error in `diagnostics` the scene is not meaningful.
+// `main_path` outlives the diagnostics.
+[[nodiscard]] UnfinishedScene ReadUnfinishedScene(const std::string& main_path, SceneLayer highest,
+                                                  AssetReader& assets, Diagnostics& diagnostics);
 
 // Reads the main file and everything it includes. Never fails otherwise than by diagnostics. Work
 // and memory are bounded by the limits whatever the bytes are. At most `max_of_each`

@@ -4,6 +4,9 @@
 // 709 are cut off at zero.
 #pragma once
 
+#include <optional>
+#include <string_view>
+
 #include "render/math/rgb.h"
 #include "render/math/wavelength_curve.h"
 
@@ -23,6 +26,20 @@ inline constexpr double kMinBlackbodyK = 500, kMaxBlackbodyK = 1e6;
 [[nodiscard]] Rgb BlackbodyColor(double temperature_k);
 // The same up to a factor, where the eye sees.
 [[nodiscard]] WavelengthCurve BlackbodyCurve(double temperature_k);
+// That factor: the radiance of a black body [W·m⁻²·sr⁻¹·nm⁻¹] is this times the curve.
+inline constexpr double kBlackbodyUnit = 2.162654e6;
+
+// CIE xy.
+struct Chromaticity {
+  double x, y;
+};
+// Of daylight, CIE 15:2018, section 4.1.2. Requires 4000 <= temperature_k <= 25000, a correlated
+// colour temperature [K] by the present constant of Planck's law.
+[[nodiscard]] Chromaticity DaylightChromaticity(double temperature_k);
+// Its curve, where the eye sees, 100 at 560 nm.
+[[nodiscard]] WavelengthCurve DaylightCurve(double temperature_k);
+// A standard illuminant by pbrt's name: stdillum-A, stdillum-D50, illum-acesD60.
+[[nodiscard]] std::optional<WavelengthCurve> IlluminantNamed(std::string_view name);
 
 // The luminance of light with this curve, where light of value 1 at all wavelengths has 1.
 [[nodiscard]] double LuminanceOf(const WavelengthCurve& curve);

@@ -44,9 +44,10 @@ TriangleHit HitTriangle(const std::array<Vec3, 3>& corners, const Ray& ray) {
 }
 
 // Whether a ray passes through a shape of this alpha as if it were not there. The number that
-// decides belongs to the ray and the shape, so that equal rays meet the same.
-bool PassesThrough(float alpha, const RTCRay& ray, std::uint32_t geometry,
-                   std::uint32_t primitive) {
+// decides belongs to the ray, the shape and how often the ray has met it before, so that equal rays
+// meet the same.
+bool PassesThrough(float alpha, const RTCRay& ray, std::uint32_t geometry, std::uint32_t primitive,
+                   std::uint32_t met_before = 0) {
   const auto pair = [](float a, float b) {
     return (std::uint64_t{std::bit_cast<std::uint32_t>(a)} << 32) | std::bit_cast<std::uint32_t>(b);
   };
@@ -54,6 +55,7 @@ bool PassesThrough(float alpha, const RTCRay& ray, std::uint32_t geometry,
   key = CombineKeys(key, pair(ray.org_x, ray.org_y));
   key = CombineKeys(key, pair(ray.org_z, ray.dir_x));
   key = CombineKeys(key, pair(ray.dir_y, ray.dir_z));
+  if (met_before > 0) key = CombineKeys(key, met_before);
   return !(KeyedRng(key).Uniform() < alpha);
 }
 
@@ -64,7 +66,7 @@ float AlphaAt(const Scene& scene, const ShapeTraits& traits, const TexturePlace&
 
 template <typename Shape>
 bool PassesThroughShape(const Scene& scene, const Shape& shape, const RTCRay& ray, float t,
-                        std::uint32_t geometry, std::uint32_t primitive) {
+                        std::uint32_t geometry, std::uint32_t primitive, std::uint32_t met_before) {
   float alpha = shape.traits.alpha;
   if (shape.traits.alpha_texture != kNoTexture) {
     const Ray along = {
@@ -72,7 +74,7 @@ bool PassesThroughShape(const Scene& scene, const Shape& shape, const RTCRay& ra
     const ShapeFace face = FaceAt(shape, along, t);
     alpha = AlphaAt(scene, shape.traits, {UvOf(shape, face.position), face.position, face.normal});
   }
-  return PassesThrough(alpha, ray, geometry, primitive);
+  return PassesThrough(alpha, ray, geometry, primitive, met_before);
 }
 
 template <typename Shape, std::vector<Shape> Scene::*kShapes>
@@ -100,23 +102,38 @@ bool LeavesTube(const std::vector<Shape>& shapes, const RTCRay& ray, float t, st
   }
 }
 
+// Where a ray meets a shape first, of its places those that its alpha leaves: through a hole in the
+// near wall of a ball the far one is met.
+template <typename Shape, std::vector<Shape> Scene::*kShapes>
+bool MeetsShape(const Scene& scene, const RTCRay& ray, std::uint32_t geometry, std::uint32_t index,
+                float& t) {
+  const Shape& shape = (scene.*kShapes)[index];
+  // A line meets no shape more often.
+  constexpr std::uint32_t kMostPlaces = 4;
+  float from = ray.tnear;
+  for (std::uint32_t met_before = 0; met_before < kMostPlaces; ++met_before) {
+    if (!IntersectShape(shape, {ray.org_x, ray.org_y, ray.org_z}, {ray.dir_x, ray.dir_y, ray.dir_z},
+                        from, ray.tfar, t)) {
+      return false;
+    }
+    if (LeavesTube(scene.*kShapes, ray, t, index)) return false;
+    if (IsWhole(shape.traits) ||
+        !PassesThroughShape(scene, shape, ray, t, geometry, index, met_before)) {
+      return true;
+    }
+    from = std::nextafter(t, HUGE_VALF);
+  }
+  return false;
+}
+
 template <typename Shape, std::vector<Shape> Scene::*kShapes>
 void IntersectedShape(const RTCIntersectFunctionNArguments* arguments) {
   if (arguments->valid[0] == 0) return;
   const auto& scene = *static_cast<const Scene*>(arguments->geometryUserPtr);
-  const Shape& shape = (scene.*kShapes)[arguments->primID];
   auto* ray_hit = reinterpret_cast<RTCRayHit*>(arguments->rayhit);
   RTCRay& ray = ray_hit->ray;
   float t = 0;
-  if (!IntersectShape(shape, {ray.org_x, ray.org_y, ray.org_z}, {ray.dir_x, ray.dir_y, ray.dir_z},
-                      ray.tnear, ray.tfar, t)) {
-    return;
-  }
-  if (LeavesTube(scene.*kShapes, ray, t, arguments->primID)) return;
-  if (!IsWhole(shape.traits) &&
-      PassesThroughShape(scene, shape, ray, t, arguments->geomID, arguments->primID)) {
-    return;
-  }
+  if (!MeetsShape<Shape, kShapes>(scene, ray, arguments->geomID, arguments->primID, t)) return;
   ray.tfar = t;
   ray_hit->hit.geomID = arguments->geomID;
   ray_hit->hit.primID = arguments->primID;
@@ -129,16 +146,10 @@ template <typename Shape, std::vector<Shape> Scene::*kShapes>
 void OccludedByShape(const RTCOccludedFunctionNArguments* arguments) {
   if (arguments->valid[0] == 0) return;
   const auto& scene = *static_cast<const Scene*>(arguments->geometryUserPtr);
-  const Shape& shape = (scene.*kShapes)[arguments->primID];
   auto* ray = reinterpret_cast<RTCRay*>(arguments->ray);
   float t = 0;
-  if (IntersectShape(shape, {ray->org_x, ray->org_y, ray->org_z},
-                     {ray->dir_x, ray->dir_y, ray->dir_z}, ray->tnear, ray->tfar, t) &&
-      !LeavesTube(scene.*kShapes, *ray, t, arguments->primID) &&
-      !(!IsWhole(shape.traits) &&
-        PassesThroughShape(scene, shape, *ray, t, arguments->geomID, arguments->primID))) {
+  if (MeetsShape<Shape, kShapes>(scene, *ray, arguments->geomID, arguments->primID, t))
     ray->tfar = -HUGE_VALF;
-  }
 }
 
 // What Embree's filter of meshes with an alpha gets.

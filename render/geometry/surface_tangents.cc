@@ -54,6 +54,7 @@ SurfaceTangents OnTriangle(const Scene& scene, const TriangleMesh& mesh,
   }
   tangents.dpdv = Cross(point.shading_normal, tangents.dpdu);
   if (!(MaxAbs(tangents.dpdv) > 0)) return AcrossNormal(point.shading_normal);
+  tangents.v_is_turned = Dot(Double3(tangents.dpdv), p.by_v) < 0;
   tangents.dpdu = Cross(tangents.dpdv, point.shading_normal);
   const Transform* to_world =
       point.instance == kNoInstance ? nullptr : &scene.instances[point.instance].to_world;

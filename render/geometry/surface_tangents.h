@@ -11,8 +11,9 @@
 namespace lucerna {
 
 struct SurfaceTangents {
-  Vec3 dpdu, dpdv;  // world [scene units per 1 of u, v]; not parallel
-  Vec3 dndu, dndv;  // of the shading normal
+  Vec3 dpdu, dpdv;           // world [scene units per 1 of u, v]; not parallel
+  Vec3 dndu, dndv;           // of the shading normal
+  bool v_is_turned = false;  // v grows against dpdv, which is at right angles to dpdu as above
 };
 
 [[nodiscard]] SurfaceTangents TangentsAt(const Scene& scene, const SurfacePoint& point);

@@ -43,6 +43,14 @@ Vec2 UvAt(const Scene& scene, const SurfacePoint& point) {
                     [&](const auto& shape) { return UvOf(shape, point.position); });
 }
 
+Rgb VertexColorAt(const Scene& scene, const SurfacePoint& point) {
+  const TriangleMesh* const mesh = MeshOf(scene, point.geometry);
+  if (mesh == nullptr || mesh->colors.empty()) return Gray(1);
+  const std::uint32_t* corner = &mesh->indices[std::size_t{3} * point.primitive];
+  return mesh->colors[corner[0]] * (1 - point.u - point.v) + mesh->colors[corner[1]] * point.u +
+         mesh->colors[corner[2]] * point.v;
+}
+
 UvSlopes UvSlopesAt(const Scene& scene, const SurfacePoint& point) {
   if (const TriangleMesh* mesh = MeshOf(scene, point.geometry)) {
     const auto [p0, p1, p2] = CornersOf(scene, *mesh, point.primitive, point.instance);

@@ -14,6 +14,8 @@
 namespace lucerna {
 
 [[nodiscard]] Vec2 UvAt(const Scene& scene, const SurfacePoint& point);
+// Between the colours of the vertices; white where there are none.
+[[nodiscard]] Rgb VertexColorAt(const Scene& scene, const SurfacePoint& point);
 // Of the corners of a triangle, in their order.
 [[nodiscard]] std::array<Vec2, 3> UvsOf(const TriangleMesh& mesh, std::uint32_t triangle);
 

@@ -37,6 +37,9 @@ struct CoatTable {
   std::vector<float> entering;
   float inner = 0;    // share of what the base scatters that comes back to it
   float leaving = 0;  // share of what the base scatters that leaves the coat
+  // Of a coat that loses no light (Material::coat_passes_rest): the factor of `entering` with which
+  // a white base reflects all light that enters. 1 for others.
+  float passing = 1;
 
   // Of a layer that scatters: what light that it scattered adds to these, for some albedos of one
   // scattering, and what leaves the coat again without having met the base.

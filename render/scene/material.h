@@ -75,8 +75,14 @@ struct MaterialNumbers {
   float alpha_v = 0;               // smooth
   float base_alpha_u = 0;          // of the metal under a coat: GGX widths; 0 and 0: smooth
   float base_alpha_v = 0;
-  float thickness = 0;         // of a coat [mean free paths], at right angles
-  Rgb coat_albedo;             // of one scattering in it; black: it only absorbs
+  float thickness = 0;  // of a coat [mean free paths], at right angles
+  Rgb coat_albedo;      // of one scattering in it; black: it only absorbs
+  // Of a coat without thickness over a diffuse base: all light that the coat's surface does not
+  // reflect reaches the base, and all light that the base reflects leaves (docs/decisions/gltf.md).
+  bool coat_passes_rest = false;
+  // Of metals and dielectrics: what files multiply reflected light by, and light that goes through.
+  Rgb reflection_tint = {1, 1, 1}, transmission_tint = {1, 1, 1};
+  bool is_tinted = false;      // one of them is not white
   std::int32_t base_hits = 5;  // how often light in a coat meets the base, at most
   // Of a coated material, once it is prepared (transport/coat.h); owned by Material. `coat_above`
   // and its share are those of a coat between two tables.
@@ -114,7 +120,10 @@ struct MaterialNumbers {
   // What turns shading normals: heights [scene units], or a picture of normals (as a texture).
   std::int32_t displacement = kNoTexture;
   std::int32_t normal_map = kNoTexture;
-  Vec2 slope_step;  // of `displacement` (SlopeStep)
+  Vec2 slope_step;         // of `displacement` (SlopeStep)
+  float normal_scale = 1;  // what the slopes of `normal_map` are multiplied by
+  // Green of `normal_map` points where v grows; else at right angles to u, on the left of it.
+  bool normal_map_follows_v = false;
   // Of a mix: indices of the two materials, and the share of the second.
   std::array<std::int32_t, 2> mixed = {-1, -1};
   std::int32_t mix_depth = 0;  // more than that of any mix that it is made of
@@ -134,6 +143,10 @@ struct MaterialNumbers {
   void ForEachColor(const Visit& visit) {
     visit(reflectance);
     visit(transmittance);
+    if (is_tinted) {
+      visit(reflection_tint);
+      visit(transmission_tint);
+    }
     // Over a metal it is multiplied by what follows from indices, in their space.
     if (kind != Kind::kCoatedConductor) visit(coat_albedo);
   }

@@ -39,6 +39,10 @@ bool IsSaturated(const Material& material) {
   using Kind = Material::Kind;
   // Not what a texture replaces.
   const bool has_color = material.texture == kNoTexture;
+  if (material.is_tinted && (IsSaturated(material.reflection_tint) ||
+                             (has_color && IsSaturated(material.transmission_tint)))) {
+    return true;
+  }
   switch (material.kind) {
     case Kind::kConductor:
     case Kind::kCoatedConductor:

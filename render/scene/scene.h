@@ -51,11 +51,17 @@ struct AreaLight {
   // by.
   Rgb radiance;
   bool two_sided = false;  // else the side that the shape's outward normal points to
-  // Over the shape's u and v, as PictureColor has it with its edges clamped.
+  // Over the shape's u and v, as mapped.
   std::shared_ptr<const Picture> picture = nullptr;
   float largest_pixel = 1;      // of `picture`, any channel
   GivenSpectrum spectrum = {};  // of the radiance, up to a factor
+  TextureMapping mapping = {};  // of `picture`: of u and v
+  Texture::Wrap wrap_u = Texture::Wrap::kClamp, wrap_v = Texture::Wrap::kClamp;
 
+  // Of `picture`.
+  [[nodiscard]] Rgb PixelAt(Vec2 uv) const {
+    return PictureColor(*picture, mapping.Map({uv, {}, {}}), wrap_u, wrap_v);
+  }
   // No channel of the radiance is anywhere larger.
   [[nodiscard]] Rgb Largest() const {
     return picture == nullptr ? radiance : radiance * largest_pixel;
@@ -74,6 +80,7 @@ struct TriangleMesh {
   std::vector<Vec3> normals;           // [vertices] or empty: shading normals
   // [vertices], or empty: the corners of each triangle, as it is wound, are (0, 0), (1, 0), (1, 1).
   std::vector<Vec2> uvs;
+  std::vector<Rgb> colors;  // [vertices] or empty: of textures "vertexcolor", in [0, 1]
   ShapeTraits traits;
 };
 

@@ -107,6 +107,14 @@ DirectoryFiles::DirectoryFiles(std::string folder, SceneLimits limits,
                                std::vector<std::string> allowed_folders)
     : folder_(std::move(folder)), limits_(limits), allowed_folders_(std::move(allowed_folders)) {}
 
+void DirectoryFiles::Add(std::string logical_path, std::string bytes) {
+  added_bytes_[std::move(logical_path)] = std::move(bytes);
+}
+
+void DirectoryFiles::AddFromDisk(std::string logical_path, std::string path) {
+  added_paths_[std::move(logical_path)] = std::move(path);
+}
+
 StatusOr<std::string> DirectoryFiles::AllowedPath(const std::string& path,
                                                   const Status& why) const {
   const auto refused = [&why](std::string_view and_why) {
@@ -145,6 +153,7 @@ StatusOr<std::string> DirectoryFiles::Read(const std::string& logical_path) {
     name = OutsideName(in_scene);
     LUCERNA_RETURN_IF_ERROR(CheckLogicalPath(name));
   }
+  if (const auto added = added_paths_.find(name); added != added_paths_.end()) path = added->second;
   const auto known = entries_.find(name);
   if (known == entries_.end() && entries_.size() >= limits_.max_files) {
     return absl::ResourceExhaustedError(
@@ -152,7 +161,13 @@ StatusOr<std::string> DirectoryFiles::Read(const std::string& logical_path) {
   }
   const std::uint64_t room = limits_.max_total_bytes - total_bytes_ +
                              (known == entries_.end() ? 0 : known->second.size_bytes);
-  LUCERNA_ASSIGN_OR_RETURN(std::string bytes, ReadFile(path, room));
+  const auto made = added_bytes_.find(name);
+  std::string bytes;
+  if (made != added_bytes_.end()) {
+    bytes = made->second;
+  } else {
+    LUCERNA_ASSIGN_OR_RETURN(bytes, ReadFile(path, room));
+  }
   SceneManifest::Entry entry = {Sha256(bytes), bytes.size()};
   if (known == entries_.end()) {
     total_bytes_ += bytes.size();

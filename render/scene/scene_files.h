@@ -73,6 +73,10 @@ class DirectoryFiles final : public SceneFiles {
  public:
   explicit DirectoryFiles(std::string folder, SceneLimits limits = {},
                           std::vector<std::string> allowed_folders = {});
+  // Files that the folder does not have, or has otherwise, by logical paths: bytes, or the path of
+  // a file anywhere.
+  void Add(std::string logical_path, std::string bytes);
+  void AddFromDisk(std::string logical_path, std::string path);
   [[nodiscard]] StatusOr<std::string> Read(const std::string& logical_path) override;
   // What was read so far, named by `main_path`.
   [[nodiscard]] SceneManifest Manifest(std::string main_path) const;
@@ -84,6 +88,8 @@ class DirectoryFiles final : public SceneFiles {
   std::string folder_;
   SceneLimits limits_;
   std::vector<std::string> allowed_folders_;
+  std::map<std::string, std::string> added_bytes_;
+  std::map<std::string, std::string> added_paths_;
   std::uint64_t total_bytes_ = 0;
   std::map<std::string, SceneManifest::Entry> entries_;
 };

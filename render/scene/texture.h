@@ -36,7 +36,8 @@
   ROW(Fbm, "fbm")                     \
   ROW(Wrinkled, "wrinkled")           \
   ROW(Windy, "windy")                 \
-  ROW(Marble, "marble")
+  ROW(Marble, "marble")               \
+  ROW(VertexColor, "vertexcolor")
 
 namespace lucerna {
 
@@ -68,8 +69,9 @@ struct Picture {
 // A place on a surface.
 struct TexturePlace {
   Vec2 uv;
-  Vec3 position;  // world
-  Vec3 normal;    // world, geometric, unit
+  Vec3 position;                 // world
+  Vec3 normal;                   // world, geometric, unit
+  Rgb vertex_color = {1, 1, 1};  // between the vertices of a mesh that has colours
 };
 
 // From a place to a texture's own coordinates, as in pbrt-v4.
@@ -111,6 +113,7 @@ struct Texture {
   bool is_inverted = false;  // picture: 1 - colour, after `scale`
   bool is_number = false;    // picture: numbers, which are not held in [0, 1]
   bool is_in_space = false;  // checkerboard: of cubes
+  bool is_nearest = false;   // picture: not interpolated, but the nearest pixel
   Rgb color;                 // constant
   Rgb tint = {1, 1, 1};      // picture of colours: the factor of each channel, beside `scale`
   float scale = 1;           // picture, scaled, marble
@@ -119,7 +122,8 @@ struct Texture {
   // which, or none. Checkerboard: where the sum of the whole parts of the coordinates is even, and
   // where it is odd. Mixed: the first, the second, and the share of the second. Direction-mixed:
   // along the direction, and across it. Bilinear: at (0, 0), (0, 1), (1, 0) and (1, 1). Dots: in
-  // dots, and between them.
+  // dots, and between them. Vertex colour: what the colour between the vertices is multiplied by,
+  // or none.
   std::array<std::int32_t, 4> parts = {-1, -1, -1, -1};
   Vec3 direction = {0, 1, 0};  // direction-mixed: world, unit
   std::int32_t octaves = 8;    // of noise
@@ -133,6 +137,9 @@ inline constexpr std::int32_t kNoTexture = -1;
 // A picture at (u, v), interpolated between the centres of its four nearest pixels.
 [[nodiscard]] Rgb PictureColor(const Picture& picture, Vec2 uv, Texture::Wrap wrap_u,
                                Texture::Wrap wrap_v);
+// The pixel of a column, or row, of which there are `count`, that continues a picture beyond its
+// edges; -1 where all is black.
+[[nodiscard]] int WrappedIndex(int index, int count, Texture::Wrap wrap);
 
 // What each kind of texture is at a place. `textures` are those of the scene, of which its parts
 // are some.

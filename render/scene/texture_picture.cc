@@ -27,17 +27,41 @@ Neighbours Around(float place, int count, Texture::Wrap wrap) {
                                                : std::min(std::max(place, -1.0F), 2.0F);
   const float pixel = within * static_cast<float>(count) - 0.5F;
   const float below = std::floor(pixel);
-  const auto index = [&](int i) {
-    if (i >= 0 && i < count) return i;
-    if (wrap == Wrap::kBlack) return -1;
-    if (wrap == Wrap::kClamp || wrap == Wrap::kMirror) return i < 0 ? 0 : count - 1;
-    return i < 0 ? i + count : i - count;
-  };
   const int first = static_cast<int>(below);
-  return {index(first), index(first + 1), pixel - below};
+  return {WrappedIndex(first, count, wrap), WrappedIndex(first + 1, count, wrap), pixel - below};
+}
+
+// Places that no int can number are numbers of the first pixel.
+Rgb NearestColor(const Texture& texture, Vec2 uv) {
+  const Picture& picture = *texture.picture;
+  const auto nearest = [](float place, int count, Texture::Wrap wrap) {
+    const float pixel = std::floor(place * static_cast<float>(count));
+    return WrappedIndex(std::abs(pixel) < 0x1p30F ? static_cast<int>(pixel) : 0, count, wrap);
+  };
+  const int column = nearest(uv.x, picture.width, texture.wrap_u);
+  const int row = nearest(1 - uv.y, picture.height, texture.wrap_v);
+  return column < 0 || row < 0 ? Rgb{} : picture.At(column, row);
 }
 
 }  // namespace
+
+int WrappedIndex(int index, int count, Texture::Wrap wrap) {
+  if (index >= 0 && index < count) return index;
+  switch (wrap) {
+    case Texture::Wrap::kBlack:
+      return -1;
+    case Texture::Wrap::kClamp:
+      return index < 0 ? 0 : count - 1;
+    case Texture::Wrap::kRepeat:
+      return ((index % count) + count) % count;
+    case Texture::Wrap::kMirror: {
+      const int twice = 2 * count;
+      const int within = ((index % twice) + twice) % twice;
+      return within < count ? within : twice - 1 - within;
+    }
+  }
+  return -1;
+}
 
 Rgb PictureColor(const Picture& picture, Vec2 uv, Texture::Wrap wrap_u, Texture::Wrap wrap_v) {
   const Neighbours x = Around(uv.x, picture.width, wrap_u);
@@ -52,8 +76,10 @@ Rgb PictureColor(const Picture& picture, Vec2 uv, Texture::Wrap wrap_u, Texture:
 
 Rgb LookUpPicture(std::span<const Texture> /*textures*/, const Texture& texture,
                   const TexturePlace& place) {
-  Rgb color =
-      PictureColor(*texture.picture, texture.mapping.Map(place), texture.wrap_u, texture.wrap_v);
+  const Vec2 uv = texture.mapping.Map(place);
+  Rgb color = texture.is_nearest
+                  ? NearestColor(texture, uv)
+                  : PictureColor(*texture.picture, uv, texture.wrap_u, texture.wrap_v);
   color *= texture.scale;
   color *= texture.tint;
   if (texture.is_inverted) {

@@ -13,7 +13,8 @@ namespace {
 // are those of Rec. 709's channels.
 Rgb MetalReflectance(const Material& material, float cos_i) {
   const Rgb reflected = FresnelConductor(cos_i, material.eta, material.k);
-  return material.is_at_wavelengths ? reflected : ToWorking(reflected);
+  const Rgb working = material.is_at_wavelengths ? reflected : ToWorking(reflected);
+  return material.is_tinted ? working * material.reflection_tint : working;
 }
 
 // The half vector of reflection, turned to z > 0; false when wo and wi have none.

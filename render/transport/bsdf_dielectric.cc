@@ -38,10 +38,13 @@ bool MakeDielectricHalf(const Material& material, Vec3 wo, Vec3 wi, DielectricHa
   return true;
 }
 
-}  // namespace
+Rgb TintOf(const Material& material, Vec3 wo, Vec3 wi) {
+  return wo.z * wi.z > 0 ? material.reflection_tint : material.transmission_tint;
+}
 
-bool DielectricBsdf::Sample(const Material& material, Vec3 wo, float u_lobe, float u1, float u2,
-                            Carried carried, BsdfSample& sample) {
+// Of clear glass.
+bool SampleClear(const Material& material, Vec3 wo, float u_lobe, float u1, float u2,
+                 Carried carried, BsdfSample& sample) {
   if (wo.z == 0) return false;
   const bool smooth = HasNoFacets(material);
   const Ggx ggx(material);
@@ -79,13 +82,22 @@ bool DielectricBsdf::Sample(const Material& material, Vec3 wo, float u_lobe, flo
   return sample.pdf > 0;
 }
 
+}  // namespace
+
+bool DielectricBsdf::Sample(const Material& material, Vec3 wo, float u_lobe, float u1, float u2,
+                            Carried carried, BsdfSample& sample) {
+  if (!SampleClear(material, wo, u_lobe, u1, u2, carried, sample)) return false;
+  if (material.is_tinted) sample.weight = sample.weight * TintOf(material, wo, sample.wi);
+  return true;
+}
+
 Rgb DielectricBsdf::Evaluate(const Material& material, Vec3 wo, Vec3 wi, Carried carried) {
   DielectricHalf half;
   if (!MakeDielectricHalf(material, wo, wi, half)) return {};
   const Ggx ggx(material);
   const float shape = ggx.D(half.m) * ggx.G2(wo, wi);
   if (half.reflects) {
-    return Gray(half.reflectance * shape / std::abs(4 * wo.z * wi.z));
+    return Gray(half.reflectance * shape / std::abs(4 * wo.z * wi.z)) * TintOf(material, wo, wi);
   }
   // W07 eq. (21), for flux; radiance is compressed besides.
   const float cos_o = Dot(wo, half.m);
@@ -94,7 +106,7 @@ Rgb DielectricBsdf::Evaluate(const Material& material, Vec3 wo, Vec3 wi, Carried
   float f =
       (1 - half.reflectance) * shape * std::abs(cos_i * cos_o) / std::max(1e-20F, denominator);
   if (carried == Carried::kRadiance) f /= half.eta * half.eta;
-  return Gray(f);
+  return Gray(f) * TintOf(material, wo, wi);
 }
 
 float DielectricBsdf::Pdf(const Material& material, Vec3 wo, Vec3 wi) {

@@ -10,7 +10,8 @@ bool ThinDielectricBsdf::Sample(const Material& material, Vec3 wo, float u_lobe,
   if (wo.z == 0) return false;
   // Each lobe is chosen with its own share. Both sides are in one medium.
   const bool reflects = u_lobe < ReflectedShare(material, wo.z);
-  sample = {reflects ? Vec3{-wo.x, -wo.y, wo.z} : -wo, Gray(1), 0, true};
+  sample = {reflects ? Vec3{-wo.x, -wo.y, wo.z} : -wo,
+            reflects ? material.reflection_tint : material.transmission_tint, 0, true};
   return true;
 }
 

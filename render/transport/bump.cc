@@ -55,9 +55,13 @@ Vec3 TangentAlong(Vec3 dpdu, Vec3 normal) {
 Turned Mapped(const Scene& scene, const Material& material, const TexturePlace& place,
               const SurfaceTangents& tangents, Vec3 normal) {
   const Rgb color = TextureColor(scene.textures, material.normal_map, place);
-  const Vec3 local = {2 * color.r - 1, 2 * color.g - 1, 2 * color.b - 1};
+  Vec3 local = {(2 * color.r - 1) * material.normal_scale,
+                (2 * color.g - 1) * material.normal_scale, 2 * color.b - 1};
   const Vec3 along = TangentAlong(tangents.dpdu, normal);
   if (!(LengthSquared(local) > 0) || along == Vec3()) return {};
+  // Where the picture is mirrored on the surface.
+  const bool is_mirrored = tangents.v_is_turned || Dot(Cross(normal, along), tangents.dpdv) < 0;
+  if (material.normal_map_follows_v && is_mirrored) local.y = -local.y;
   const Vec3 turned = Normalize(Frame(along, normal).ToWorld(Normalize(local)));
   const Vec3 u = DirectionOf(tangents.dpdu);
   const Vec3 dpdu = u - turned * Dot(u, turned);

@@ -101,8 +101,12 @@ void FitCoat(MaterialNumbers& material) {
 }
 
 float CoatEntering(const Material& material, Vec3 w) {
-  if (HasNoFacets(material)) return SmoothCoatEntering(material, w.z);
-  return ReadTable(material, [&](const CoatTable& table) { return EnteringIn(table, w); });
+  const float entering =
+      HasNoFacets(material)
+          ? SmoothCoatEntering(material, w.z)
+          : ReadTable(material, [&](const CoatTable& table) { return EnteringIn(table, w); });
+  if (!material.coat_passes_rest) return entering;
+  return entering * ReadTable(material, [](const CoatTable& table) { return table.passing; });
 }
 
 float CoatInner(const Material& material) {

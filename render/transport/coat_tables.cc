@@ -74,6 +74,17 @@ float RoughEntering(const MaterialNumbers& material, const Ggx& ggx, Vec3 w) {
   });
 }
 
+// The share of light that the coat's facets reflect away from it.
+float RoughReflected(const MaterialNumbers& material, const Ggx& ggx, Vec3 w) {
+  const float visible = ggx.G1(w);
+  return MeanOverFacets(ggx, w, [&](Vec3 m, float /*share*/) {
+    float cos_t = 0;
+    const float reflected = FresnelDielectric(Dot(w, m), material.ior, cos_t);
+    const Vec3 up = ReflectAt(w, m);
+    return up.z > 0 ? reflected * ggx.G2(w, up) / visible : 0.0F;
+  });
+}
+
 // Of light that goes up from the base: the share that the coat's surface sends down to it.
 float RoughReturned(const MaterialNumbers& material, const Ggx& ggx, Vec3 w) {
   const float visible = ggx.G1(w);
@@ -97,7 +108,43 @@ float MeanOverBase(int angles, const Function& of) {
   return static_cast<float>(sum / angles);
 }
 
+// f(wo, wi) = (1 - R(wo)) (1 - R(wi)) / (1 - R̄) · ρ/π, with R the share that the coat's surface
+// reflects and R̄ its mean, reflects all of what is left when ρ is 1 (Kelemen & Szirmay-Kalos 2001,
+// "A Microfacet Based Coupled Specular-Matte BRDF Model with Importance Sampling").
+CoatTable MakePassingTable(const MaterialNumbers& material) {
+  CoatTable table;
+  const bool is_smooth = HasNoFacets(material);
+  const Ggx ggx(material);
+  table.rows = material.alpha_u == material.alpha_v ? 1 : kAzimuths;
+  const auto azimuth_of = [&](int row) {
+    return table.rows == 1
+               ? 0
+               : 0.5F * kPi * static_cast<float>(row) / static_cast<float>(kAzimuths - 1);
+  };
+  const auto passed = [&](float cosine, int row) {
+    if (is_smooth) return SmoothCoatEntering(material, cosine);
+    return 1 - RoughReflected(material, ggx, DirectionAt(cosine, azimuth_of(row)));
+  };
+  float mean = 0;
+  float sum_of_weights = 0;
+  for (int row = 0; row < table.rows; ++row) {
+    // All light that falls in along the surface is reflected.
+    for (int i = 0; i < CoatTable::kCosines && !is_smooth; ++i)
+      table.entering.push_back(i == 0 ? 0.0F : std::max(0.0F, passed(CoatTable::CosineOf(i), row)));
+    const bool is_end = table.rows > 1 && (row == 0 || row == table.rows - 1);
+    const float weight = is_end ? 0.5F : 1.0F;
+    sum_of_weights += weight;
+    mean += weight * MeanOverBase(is_smooth ? kSmoothAngles : kAngles,
+                                  [&](float cosine) { return passed(cosine, row); });
+  }
+  mean /= sum_of_weights;
+  table.passing = material.ior / std::sqrt(mean);
+  table.leaving = mean * table.passing / Square(material.ior);
+  return table;
+}
+
 CoatTable MakeTable(const MaterialNumbers& material) {
+  if (material.coat_passes_rest) return MakePassingTable(material);
   CoatTable table;
   const float ior = material.ior;
   if (HasNoFacets(material)) {
@@ -352,7 +399,7 @@ void ForEachTurn(const Material& material, float cosine, const Visit& visit) {
 // average.
 struct NodeFlux {
   std::vector<double> flux;
-  // The same times Lagrange's polynomials at the metal's facets; empty where nobody asks for it.
+  // The same times Lagrange's polynomials at the metal's facets; empty where they are not wanted.
   std::vector<CosineSums> cosines;
 };
 NodeFlux ReflectedBetweenNodes(const Material& material, const Ggx& facets, bool has_cosines) {
@@ -642,7 +689,7 @@ std::shared_ptr<const CoatFamily> FamilyOf(const Material& material,
 
 void PrepareCoats(std::vector<Material>& materials, int threads) {
   using Key = std::tuple<Material::Kind, float, float, float, float, float, float, std::int32_t,
-                         bool, float>;
+                         bool, float, bool>;
   const auto key_of = [](const Material& material) {
     const bool has_metal = material.kind == Material::Kind::kCoatedConductor;
     return Key{material.kind,
@@ -654,7 +701,8 @@ void PrepareCoats(std::vector<Material>& materials, int threads) {
                has_metal ? material.base_alpha_v : 0,
                has_metal || material.HasHaze() ? material.base_hits : 0,
                material.HasHaze(),
-               material.HasHaze() ? material.phase_g : 0};
+               material.HasHaze() ? material.phase_g : 0,
+               material.coat_passes_rest};
   };
   std::map<Key, std::shared_ptr<const CoatTable>> tables;
   std::map<std::pair<Key, CoatFamily::Differing>, std::shared_ptr<const CoatFamily>> families;

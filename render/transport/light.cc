@@ -40,10 +40,18 @@ constexpr double kEvenShareOfLights = 0.1;
 // Cells of pictures on area lights: of a side of one emitter, and of all together.
 constexpr int kMostSpreadSide = 256;
 constexpr double kMostSpreadCells = 1 << 22;
+// Places along a side of each emitter at which the texture of its alpha is looked up, at least.
+constexpr int kFewestMaskPlaces = 4;
+
+// The share of a shape's light that its alpha leaves, where that is the same everywhere: the share
+// of rays that meet it, as in pbrt-v4. A light that no ray meets (alpha 0) keeps all of it.
+float EvenShare(const ShapeTraits& traits) {
+  return traits.alpha == 0 || traits.alpha_texture != kNoTexture ? 1 : traits.alpha;
+}
 
 // Of the picture of a light, in the scene's colours.
 Rgb PixelsAt(const Scene& scene, const AreaLight& light, Vec2 uv) {
-  const Rgb color = PictureColor(*light.picture, uv, Texture::Wrap::kClamp, Texture::Wrap::kClamp);
+  const Rgb color = light.PixelAt(uv);
   return scene.uplift == nullptr ? ToWorking(color) : scene.uplift->Unbounded(color);
 }
 
@@ -96,35 +104,48 @@ LightSet::LightSet(const Scene& scene, const Intersector& intersector,
     emitter.kind = kind;
     emitter.two_sided = light.two_sided;
     emitter.area = area;
-    // As pbrt-v4 has it: the share of the light that rays would find. A light that none would find
-    // shines with all its strength, unseen.
     emitter.is_invisible = traits.alpha == 0;
-    const float factor = emitter.is_invisible ? 1 : traits.alpha;
+    emitter.is_seen_through = light.two_sided && !IsWhole(traits);
+    emitter.is_masked = traits.alpha_texture != kNoTexture;
+    const float factor = EvenShare(traits);
     emitter.radiance = light.radiance * factor;
     emitter.power = emitter.radiance * (kPi * area * (light.two_sided ? 2.0F : 1.0F));
     if (light.picture != nullptr) emitter.spread = 0;  // numbered below
     largest_of_areas_ = std::max(largest_of_areas_, MaxChannel(light.Largest() * factor));
     return emitter;
   };
-  const auto most_cells = [&] {
+  // The power of two, up to `most`, of a side of each of the emitters that `counts`, whose squares
+  // are at most `most_of_all` together.
+  const auto side_of = [&](const auto& counts, int most, double most_of_all) {
     double emitters = 0;
     const auto count = [&](const ShapeTraits& traits, double of_shape) {
-      if (traits.area_light == kNoAreaLight) return;
-      if (LightOf(traits).picture != nullptr) emitters += of_shape;
+      if (traits.area_light != kNoAreaLight && counts(traits)) emitters += of_shape;
     };
     for (const TriangleMesh& mesh : scene.meshes) {
       const std::size_t triangles = mesh.indices.size() / 3;
       count(mesh.traits, static_cast<double>(triangles));
     }
     ForEachAnalyticShape(scene, [&](const auto& shape) { count(shape.traits, 1); });
-    int side = kMostSpreadSide;
-    while (side > 1 && emitters * side * side > kMostSpreadCells)
+    int side = most;
+    while (side > 1 && emitters * side * side > most_of_all)
       side /= 2;
     return side;
-  }();
+  };
+  const int most_cells =
+      side_of([&](const ShapeTraits& traits) { return LightOf(traits).picture != nullptr; },
+              kMostSpreadSide, kMostSpreadCells);
+  const int mask_places =
+      std::max(kFewestMaskPlaces,
+               side_of([](const ShapeTraits& traits) { return traits.alpha_texture != kNoTexture; },
+                       kMostSpreadSide, kMostSpreadCells));
+  const auto mask = [&](Emitter& emitter) {
+    if (!emitter.is_masked) return;
+    emitter.mask_share = MaskShare(emitter, mask_places);
+    emitter.power *= emitter.mask_share;
+  };
   // Takes the place of an even power.
   const auto spread = [&](Emitter& emitter, const AreaLight& light, PictureSpread of_picture) {
-    const float factor = emitter.is_invisible ? 1 : TraitsOf(emitter).alpha;
+    const float factor = EvenShare(TraitsOf(emitter));
     emitter.power =
         of_picture.mean() * (factor * kPi * emitter.area * (light.two_sided ? 2.0F : 1.0F));
     emitter.spread = static_cast<std::int32_t>(spreads_.size());
@@ -146,6 +167,7 @@ LightSet::LightSet(const Scene& scene, const Intersector& intersector,
         const AreaLight& light = LightOf(mesh.traits);
         spread(emitter, light, PictureSpread::OfTriangle(light, UvsOf(mesh, t), most_cells));
       }
+      mask(emitter);
       const Vec3 normal = TriangleNormal(p0, mesh.positions[corner[1]], mesh.positions[corner[2]]);
       // What nothing can receive is not sent.
       if (!selection.includes_faces_away && !emitter.two_sided && FacesAway(p0, normal, bounds)) {
@@ -172,6 +194,7 @@ LightSet::LightSet(const Scene& scene, const Intersector& intersector,
         };
         spread(emitter, light, PictureSpread::OfSurface(light, uv_of, most_cells));
       }
+      mask(emitter);
       if constexpr (std::decay_t<decltype(shape)>::kIsFlat) {
         if (!selection.includes_faces_away && !emitter.two_sided &&
             FacesAway(shape.center, shape.normal, bounds)) {
@@ -228,11 +251,12 @@ void LightSet::TakeColors() {
         LUCERNA_ANALYTIC_SHAPES(LUCERNA_CASE) {
 #undef LUCERNA_CASE
           const ShapeTraits& traits = TraitsOf(emitter);
-          emitter.radiance = LightOf(traits).radiance * (emitter.is_invisible ? 1 : traits.alpha);
+          emitter.radiance = LightOf(traits).radiance * EvenShare(traits);
           // What a picture sends is computed for each photon.
           if (sends && emitter.spread < 0) {
             emitter.power =
                 emitter.radiance * (kPi * emitter.area * (emitter.two_sided ? 2.0F : 1.0F));
+            emitter.power *= emitter.mask_share;
           }
           break;
         }
@@ -415,7 +439,11 @@ void LightSet::GroupLights(const std::vector<std::size_t>& light_of,
 }
 
 float LightSet::LargestShareOf(const Emitter& emitter) const {
-  if (emitter.spread >= 0) return SpreadOf(emitter).largest_share();
+  const float of_picture = emitter.spread >= 0 ? SpreadOf(emitter).largest_share() : 1;
+  // A mask that is next to white makes photons differ too.
+  constexpr float kLeastOfMask = 1.001F;
+  if (emitter.is_masked) return std::max(of_picture / emitter.mask_share, kLeastOfMask);
+  if (emitter.spread >= 0) return of_picture;
   switch (emitter.kind) {
 #define LUCERNA_CASE(Name, name) case Kind::k##Name:
     LUCERNA_INFINITE_LIGHTS(LUCERNA_CASE)
@@ -519,6 +547,14 @@ bool LightSet::SampleEmission(double u_choice, float u_place1, float u_place2, f
           emission.flux =
               PictureRadiance(emitter, UvOn(emitter, u_place1, u_place2, position)) *
               (kPi * emitter.area * (emitter.two_sided ? 2.0F : 1.0F) / (emitter.choice * density));
+          if (IsBlack(emission.flux)) return false;
+        } else if (emitter.is_masked) {
+          emission.flux = emitter.radiance *
+                          (kPi * emitter.area * (emitter.two_sided ? 2.0F : 1.0F) / emitter.choice);
+        }
+        if (emitter.is_masked) {
+          const Vec2 uv = UvOn(emitter, u_place1, u_place2, position);
+          emission.flux *= ShareAt(emitter, {uv, position, normal});
           if (IsBlack(emission.flux)) return false;
         }
         if (emitter.two_sided) {
@@ -701,21 +737,30 @@ bool LightSet::SampleEmitter(const Emitter& emitter, const LitPoint& lit, float 
   const Vec3 from = lit.position;
   sample.emitter = static_cast<std::uint32_t>(&emitter - emitters_.data());
   switch (emitter.kind) {
-#define LUCERNA_CASE(Name, list, name)                                          \
-  case Kind::k##Name: {                                                         \
-    SeenPlace seen;                                                             \
-    if (!SampleSeen(scene_.list[emitter.primitive], from, u1, u2, seen)) break; \
-    sample.wi = seen.wi;                                                        \
-    sample.is_distant = false;                                                  \
-    sample.target = seen.target;                                                \
-    sample.pdf = choice / seen.inverse_pdf;                                     \
-    sample.radiance_over_pdf = emitter.radiance / sample.pdf;                   \
-    if (emitter.spread >= 0) {                                                  \
-      const Vec2 uv = UvOf(scene_.list[emitter.primitive], seen.target);        \
-      sample.radiance_over_pdf = PictureRadiance(emitter, uv) / sample.pdf;     \
-    }                                                                           \
-    if (emitter.is_invisible) sample.pdf = 0;                                   \
-    return true;                                                                \
+#define LUCERNA_CASE(Name, list, name)                                                           \
+  case Kind::k##Name: {                                                                          \
+    SeenPlace seen;                                                                              \
+    if (emitter.is_seen_through ||                                                               \
+        !SampleSeen(scene_.list[emitter.primitive], from, u1, u2, seen)) {                       \
+      break;                                                                                     \
+    }                                                                                            \
+    sample.wi = seen.wi;                                                                         \
+    sample.is_distant = false;                                                                   \
+    sample.target = seen.target;                                                                 \
+    sample.pdf = choice / seen.inverse_pdf;                                                      \
+    sample.radiance_over_pdf = emitter.radiance / sample.pdf;                                    \
+    if (emitter.spread >= 0) {                                                                   \
+      const Vec2 uv = UvOf(scene_.list[emitter.primitive], seen.target);                         \
+      sample.radiance_over_pdf = PictureRadiance(emitter, uv) / sample.pdf;                      \
+    }                                                                                            \
+    if (emitter.is_masked) {                                                                     \
+      const auto& shape = scene_.list[emitter.primitive];                                        \
+      const Vec2 u = FaceNumbers(shape, seen.target);                                            \
+      sample.radiance_over_pdf *= ShareAt(                                                       \
+          emitter, {UvOf(shape, seen.target), seen.target, SampleFace(shape, u.x, u.y).normal}); \
+    }                                                                                            \
+    if (emitter.is_invisible) sample.pdf = 0;                                                    \
+    return true;                                                                                 \
   }
     LUCERNA_ANALYTIC_SHAPES(LUCERNA_CASE)
 #undef LUCERNA_CASE
@@ -749,6 +794,7 @@ bool LightSet::SampleEmitter(const Emitter& emitter, const LitPoint& lit, float 
     u2 = place.y;
   }
   PointOn(emitter, u1, u2, position, normal, clearance);
+  const Vec3 outward = normal;
   const Vec3 to = position - from;
   const float distance2 = LengthSquared(to);
   if (!(distance2 > 0)) return false;
@@ -767,6 +813,10 @@ bool LightSet::SampleEmitter(const Emitter& emitter, const LitPoint& lit, float 
       (emitter.spread >= 0 ? PictureRadiance(emitter, UvOn(emitter, u1, u2, position))
                            : emitter.radiance) /
       sample.pdf;
+  if (emitter.is_masked) {
+    sample.radiance_over_pdf *=
+        ShareAt(emitter, {UvOn(emitter, u1, u2, position), position, outward});
+  }
   if (emitter.is_invisible) sample.pdf = 0;
   return true;
 }
@@ -793,6 +843,32 @@ const ShapeTraits& LightSet::TraitsOf(const Emitter& emitter) const {
     default:
       return scene_.meshes[emitter.geometry].traits;
   }
+}
+
+float LightSet::ShareAt(const Emitter& emitter, const TexturePlace& place) const {
+  return std::clamp(TextureNumber(scene_.textures, TraitsOf(emitter).alpha_texture, place), 0.0F,
+                    1.0F);
+}
+
+float LightSet::MaskShare(const Emitter& emitter, int side) const {
+  const auto along = [&](int i) {
+    return (static_cast<float>(i) + 0.5F) / static_cast<float>(side);
+  };
+  double sum = 0;
+  for (int y = 0; y < side; ++y) {
+    for (int x = 0; x < side; ++x) {
+      Vec3 position;
+      Vec3 normal;
+      float clearance = 0;
+      PointOn(emitter, along(x), along(y), position, normal, clearance);
+      sum += static_cast<double>(
+          ShareAt(emitter, {UvOn(emitter, along(x), along(y), position), position, normal}));
+    }
+  }
+  // What was missed between the places has power too: checks of results allow for no more than
+  // there is (EmissionCheck).
+  const double places = static_cast<double>(side) * side;
+  return static_cast<float>(std::min(1.0, sum / places * (1 + 2.0 / side) + 1 / places));
 }
 
 Rgb LightSet::PictureRadiance(const Emitter& emitter, Vec2 uv) const {
@@ -846,7 +922,7 @@ float LightSet::PdfDirect(const LitPoint& lit, const SurfacePoint& point) const 
   if (emitter == nullptr) return 0;
   const Vec3 from = lit.position;
   const float choice = DirectChoice(*emitter, lit);
-  if (emitter->kind != Kind::kTriangle) {
+  if (emitter->kind != Kind::kTriangle && !emitter->is_seen_through) {
     const float inverse_pdf =
         VisitShape(scene_, KindOf(scene_, point.geometry), point.primitive,
                    [&](const auto& shape) { return SeenInversePdf(shape, from); });

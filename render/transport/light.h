@@ -60,9 +60,12 @@ struct Emitter {
   std::uint32_t primitive =
       0;  // triangle, or index among the shapes or lights of the kind, or the infinite lights
   bool two_sided = false;
-  bool is_invisible = false;  // no ray finds it: only sampling and photons do
-  bool is_sampled = true;     // for direct light
-  std::int32_t spread = -1;   // of an area light with a picture: index of its spread
+  bool is_invisible = false;     // no ray finds it: only sampling and photons do
+  bool is_seen_through = false;  // its far walls shine as well, through near ones
+  bool is_masked = false;        // what it sends is multiplied by the texture of its shape's alpha
+  float mask_share = 1;          // the mean of that texture, or a little more
+  bool is_sampled = true;        // for direct light
+  std::int32_t spread = -1;      // of an area light with a picture: index of its spread
   float area = 0;
   float choice = 0;           // probability for a photon: its share of the power
   float direct_choice = 0;    // probability for direct light, wherever it arrives
@@ -225,6 +228,10 @@ class LightSet {
     return spreads_[static_cast<std::size_t>(emitter.spread)];
   }
   [[nodiscard]] Rgb PictureRadiance(const Emitter& emitter, Vec2 uv) const;
+  // Of masked emitters: the share of its light that one sends at a place, and Emitter::mask_share,
+  // from `side` × `side` places.
+  [[nodiscard]] float ShareAt(const Emitter& emitter, const TexturePlace& place) const;
+  [[nodiscard]] float MaskShare(const Emitter& emitter, int side) const;
   // Texture coordinates of the place that PointOn draws with these numbers.
   [[nodiscard]] Vec2 UvOn(const Emitter& emitter, float u1, float u2, Vec3 position) const;
   // The share of the light at a point of the emitter, over its share of the area.

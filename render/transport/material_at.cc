@@ -85,7 +85,7 @@ void LookUpRoughness(const Scene& scene, const TexturePlace& place, const Materi
 }  // namespace
 
 TexturePlace PlaceOf(const Scene& scene, const SurfacePoint& point) {
-  return {UvAt(scene, point), point.position, point.geometric_normal};
+  return {UvAt(scene, point), point.position, point.geometric_normal, VertexColorAt(scene, point)};
 }
 
 float AlphaAt(const Scene& scene, const SurfacePoint& point) {

@@ -147,6 +147,14 @@ PassColors::PassColors(const Scene& working) {
     of.extinction_spectrum = ColorSpectrum::OfUnbounded(FromWorking(m.extinction));
     of.coat_albedo_spectrum = ColorSpectrum::OfReflectance(
         m.kind == Material::Kind::kCoatedConductor ? m.coat_albedo : FromWorking(m.coat_albedo));
+    of.reflection_tint = m.reflection_tint;
+    of.transmission_tint = m.transmission_tint;
+    if (m.is_tinted) {
+      of.reflection_tint_spectrum =
+          ColorSpectrum::OfReflectance(FromWorking(m.reflection_tint), {});
+      of.transmission_tint_spectrum =
+          ColorSpectrum::OfReflectance(FromWorking(m.transmission_tint), {});
+    }
     const bool is_metal =
         m.kind == Material::Kind::kConductor || m.kind == Material::Kind::kCoatedConductor;
     of.is_metal_of_reflectance =
@@ -209,6 +217,10 @@ void PassColors::SetAt(const PassWavelengths& wavelengths, Scene& scene) {
                                              : of.absorption_spectrum.At(wavelengths);
     m.extinction = of.extinction_spectrum.At(wavelengths);
     m.coat_albedo = of.coat_albedo_spectrum.At(wavelengths);
+    if (m.is_tinted) {
+      m.reflection_tint = of.reflection_tint_spectrum.At(wavelengths);
+      m.transmission_tint = of.transmission_tint_spectrum.At(wavelengths);
+    }
     if (m.measured != nullptr) m.measured_planes = m.measured->At(wavelengths.nm);
   }
   for (std::size_t i = 0; i < media_.size(); ++i) {
@@ -234,6 +246,8 @@ void PassColors::SetThree(Scene& scene) {
     m.absorption = of.absorption;
     m.extinction = of.extinction;
     m.coat_albedo = of.coat_albedo;
+    m.reflection_tint = of.reflection_tint;
+    m.transmission_tint = of.transmission_tint;
     if (m.measured != nullptr) m.measured_planes = m.measured->WorkingSpace();
   }
   for (std::size_t i = 0; i < media_.size(); ++i) {

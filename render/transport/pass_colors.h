@@ -58,10 +58,11 @@ class PassColors {
 
  private:
   struct OfMaterial {
-    Rgb reflectance, transmittance, eta, k, absorption, extinction,
-        coat_albedo;  // the three colours
+    Rgb reflectance, transmittance, eta, k, absorption, extinction, coat_albedo, reflection_tint,
+        transmission_tint;  // the three colours
     ColorSpectrum reflectance_spectrum, transmittance_spectrum, eta_spectrum, k_spectrum,
-        absorption_spectrum, extinction_spectrum, coat_albedo_spectrum;
+        absorption_spectrum, extinction_spectrum, coat_albedo_spectrum, reflection_tint_spectrum,
+        transmission_tint_spectrum;
     bool is_metal_of_reflectance = false;  // eta is 1, and k follows from the reflectance
   };
   struct OfMedium {

@@ -21,6 +21,12 @@ constexpr double kLeastOfMean = 0.01;
 constexpr int kFewestPlaces = 256;
 constexpr int kMostPlaces = 1024;
 
+// What a triangle shows is integrated pixel by pixel up to so many times the square of the most
+// cells of a side, which fall with the number of emitters.
+constexpr double kMostPixels = 4096;
+// Of a picture that is repeated: lines farther off are not numbered.
+constexpr double kFarthestPixel = 1 << 28;
+
 using Color = std::array<double, 3>;
 
 struct Point {
@@ -65,19 +71,25 @@ Polygon CutOff(const Polygon& polygon, double Point::*coordinate, double at, dou
 }
 
 // A picture as a function of the place in pixels, from the centre of the top left one, y downwards:
-// between the lines at whole numbers it is bilinear, and beyond its first and last ones the same as
-// there.
+// between the lines at whole numbers it is bilinear. Where its edges are clamped it is the same
+// beyond its first and last lines as there.
 class Pixels {
  public:
-  explicit Pixels(const AreaLight& light) : picture_(*light.picture) {
+  explicit Pixels(const AreaLight& light)
+      : light_(light),
+        picture_(*light.picture),
+        across_{picture_.width, light.wrap_u},
+        down_{picture_.height, light.wrap_v} {
     const auto luminance = [&](Rgb pixel) {
       return static_cast<double>(Luminance(light.radiance * ToWorking(pixel)));
     };
     luminance_ = {luminance({1, 0, 0}), luminance({0, 1, 0}), luminance({0, 0, 1})};
   }
 
-  [[nodiscard]] Point PlaceOf(double u, double v) const {
-    return {u * picture_.width - 0.5, (1 - v) * picture_.height - 0.5};
+  [[nodiscard]] Point PlaceOf(Vec2 uv) const {
+    const Vec2 at = light_.mapping.Map({uv, {}, {}});
+    return {static_cast<double>(at.x) * picture_.width - 0.5,
+            (1 - static_cast<double>(at.y)) * picture_.height - 0.5};
   }
   [[nodiscard]] double LuminanceOf(const Color& c) const {
     return luminance_[0] * c[0] + luminance_[1] * c[1] + luminance_[2] * c[2];
@@ -87,21 +99,35 @@ class Pixels {
   // of the pixels that it lies between.
   void Integrate(const Polygon& polygon, Color& integral, double& largest) const {
     const auto [low, high] = Ends(polygon, &Point::y);
-    const int first = LineBefore(low, picture_.height);
-    const int last = LineBefore(high, picture_.height);
+    const int first = down_.LineBefore(low);
+    const int last = down_.LineBefore(high);
     for (int row = first; row <= last; ++row) {
       Polygon strip = polygon;
-      if (row >= 0) strip = CutOff(strip, &Point::y, row, 1);
-      if (row < picture_.height - 1) strip = CutOff(strip, &Point::y, row + 1, -1);
+      if (down_.HasLine(row)) strip = CutOff(strip, &Point::y, row, 1);
+      if (down_.HasLine(row + 1)) strip = CutOff(strip, &Point::y, row + 1, -1);
       if (strip.count > 2) IntegrateStrip(strip, row, integral, largest);
     }
   }
 
  private:
-  // The number of the line at or before a place: -1 before the first, and never beyond the last.
-  static int LineBefore(double place, int pixels) {
-    return static_cast<int>(std::floor(std::clamp(place, -1.0, static_cast<double>(pixels - 1))));
-  }
+  // Lines along one side.
+  struct Lines {
+    int pixels;
+    Texture::Wrap wrap;
+
+    // The number of the line at or before a place. Where edges are clamped -1 before the first, and
+    // never beyond the last.
+    [[nodiscard]] int LineBefore(double place) const {
+      const double within = wrap == Texture::Wrap::kClamp
+                                ? std::clamp(place, -1.0, static_cast<double>(pixels - 1))
+                                : place;
+      return static_cast<int>(std::floor(within));
+    }
+    // Whether the picture changes its form there.
+    [[nodiscard]] bool HasLine(int line) const {
+      return wrap != Texture::Wrap::kClamp || (line >= 0 && line < pixels);
+    }
+  };
   static std::pair<double, double> Ends(const Polygon& polygon, double Point::*coordinate) {
     double low = HUGE_VAL;
     double high = -HUGE_VAL;
@@ -114,8 +140,9 @@ class Pixels {
   // The four pixels around a cell of the lines: top left, top right, bottom left, bottom right.
   [[nodiscard]] std::array<Color, 4> Around(int column, int row) const {
     const auto at = [&](int x, int y) {
-      const Rgb pixel =
-          picture_.At(std::clamp(x, 0, picture_.width - 1), std::clamp(y, 0, picture_.height - 1));
+      const int pixel_x = WrappedIndex(x, across_.pixels, across_.wrap);
+      const int pixel_y = WrappedIndex(y, down_.pixels, down_.wrap);
+      const Rgb pixel = pixel_x < 0 || pixel_y < 0 ? Rgb() : picture_.At(pixel_x, pixel_y);
       return Color{static_cast<double>(pixel.r), static_cast<double>(pixel.g),
                    static_cast<double>(pixel.b)};
     };
@@ -125,13 +152,13 @@ class Pixels {
   // Between two neighbouring lines.
   void IntegrateStrip(const Polygon& strip, int row, Color& integral, double& largest) const {
     const auto [low, high] = Ends(strip, &Point::x);
-    const int first = LineBefore(low, picture_.width);
-    const int last = LineBefore(high, picture_.width);
+    const int first = across_.LineBefore(low);
+    const int last = across_.LineBefore(high);
     // A convex strip is narrowest at its ends: cells between those are in it as a whole.
     const auto [top, bottom] = Ends(strip, &Point::y);
     double whole_low = HUGE_VAL;
     double whole_high = -HUGE_VAL;
-    if (row >= 0 && row < picture_.height - 1 && top <= row && bottom >= row + 1) {
+    if (down_.HasLine(row) && down_.HasLine(row + 1) && top <= row && bottom >= row + 1) {
       double left[2] = {HUGE_VAL, HUGE_VAL};
       double right[2] = {-HUGE_VAL, -HUGE_VAL};
       for (std::size_t i = 0; i < strip.count; ++i) {
@@ -148,15 +175,15 @@ class Pixels {
       const std::array<Color, 4> around = Around(column, row);
       for (const Color& pixel : around)
         largest = std::max(largest, LuminanceOf(pixel));
-      if (column >= 0 && column < picture_.width - 1 && column >= whole_low &&
+      if (across_.HasLine(column) && across_.HasLine(column + 1) && column >= whole_low &&
           column + 1 <= whole_high) {
         for (std::size_t c = 0; c < 3; ++c)
           integral[c] += 0.25 * (around[0][c] + around[1][c] + around[2][c] + around[3][c]);
         continue;
       }
       Polygon piece = strip;
-      if (column >= 0) piece = CutOff(piece, &Point::x, column, 1);
-      if (column < picture_.width - 1) piece = CutOff(piece, &Point::x, column + 1, -1);
+      if (across_.HasLine(column)) piece = CutOff(piece, &Point::x, column, 1);
+      if (across_.HasLine(column + 1)) piece = CutOff(piece, &Point::x, column + 1, -1);
       if (piece.count > 2) IntegratePiece(piece, column, row, around, integral);
     }
   }
@@ -185,7 +212,9 @@ class Pixels {
     }
   }
 
+  const AreaLight& light_;
   const Picture& picture_;
+  Lines across_, down_;
   Color luminance_{};  // of the light, for 1 of each channel of a pixel
 };
 
@@ -253,15 +282,26 @@ PictureSpread PictureSpread::OfTriangle(const AreaLight& light, const std::array
   const Pixels pixels(light);
   std::array<Point, 3> at;
   for (std::size_t i = 0; i < 3; ++i)
-    at[i] = pixels.PlaceOf(static_cast<double>(uvs[i].x), static_cast<double>(uvs[i].y));
+    at[i] = pixels.PlaceOf(uvs[i]);
   Polygon whole;
   for (const Point& p : at)
     whole.Add(p);
   double extent = 0;
   for (const Point& p : at)
     extent = std::max({extent, std::abs(p.x - at[0].x), std::abs(p.y - at[0].y)});
-  // As if looked up at places: a line of the picture, or a point.
-  if (!(std::abs(DoubleArea(whole)) > 1e-9 * extent * extent)) {
+  // A line of the picture, or a point; or so many of its pixels, or so far off, that they cannot be
+  // gone through, for all emitters, or numbered.
+  double farthest = 0;
+  for (const Point& p : at)
+    farthest = std::max({farthest, std::abs(p.x), std::abs(p.y)});
+  const double area = 0.5 * std::abs(DoubleArea(whole));
+  const bool is_clamped =
+      light.wrap_u == Texture::Wrap::kClamp && light.wrap_v == Texture::Wrap::kClamp;
+  const double gone_through =
+      is_clamped ? std::min(area, static_cast<double>(light.picture->width) * light.picture->height)
+                 : area;
+  if (!(area > 1e-9 * extent * extent) || (!is_clamped && farthest > kFarthestPixel) ||
+      gone_through > kMostPixels * most_cells * most_cells) {
     return OfSurface(
         light,
         [&](Vec2 u) {
@@ -320,8 +360,9 @@ PictureSpread PictureSpread::OfSurface(const AreaLight& light,
                                        const std::function<Vec2(Vec2)>& uv_of, int most_cells) {
   const Pixels pixels(light);
   const Picture& picture = *light.picture;
+  // As many as the cells of one emitter of few; fewer where they are many.
   const int places = SideFor(2.0 * std::max({picture.width, picture.height, kFewestPlaces / 2}),
-                             std::max(kMostPlaces, most_cells));
+                             std::clamp(16 * most_cells, 16, kMostPlaces));
   const int side = std::min(most_cells, places / 4);
   const int parts = places / side;
   std::vector<Cell> cells(static_cast<std::size_t>(side) * static_cast<std::size_t>(side));
@@ -330,8 +371,7 @@ PictureSpread PictureSpread::OfSurface(const AreaLight& light,
       const auto along = [&](int i) {
         return (static_cast<float>(i) + 0.5F) / static_cast<float>(side * parts);
       };
-      const Rgb color = PictureColor(picture, uv_of({along(x), along(y)}), Texture::Wrap::kClamp,
-                                     Texture::Wrap::kClamp);
+      const Rgb color = light.PixelAt(uv_of({along(x), along(y)}));
       Cell& cell = cells[static_cast<std::size_t>(y / parts) * static_cast<std::size_t>(side) +
                          static_cast<std::size_t>(x / parts)];
       Color at{};

@@ -11,6 +11,7 @@ std::span<const FuzzTarget> AllFuzzTargets() {
       FuzzTarget{"mitsuba", FuzzMitsuba, MitsubaSeeds},
       FuzzTarget{"obj", FuzzObj, ObjSeeds},
       FuzzTarget{"ply", FuzzPly, PlySeeds},
+      FuzzTarget{"view", FuzzView, ViewSeeds},
       FuzzTarget{"sensors", FuzzSensors, SensorsSeeds},
       FuzzTarget{"measured", FuzzMeasured, MeasuredSeeds},
       FuzzTarget{"image", FuzzImage, ImageSeeds},

@@ -34,6 +34,8 @@ bool FuzzGltf(std::string_view bytes);
 std::vector<std::string> GltfSeeds();
 bool FuzzPly(std::string_view bytes);
 std::vector<std::string> PlySeeds();
+bool FuzzView(std::string_view bytes);
+std::vector<std::string> ViewSeeds();
 bool FuzzSensors(std::string_view bytes);
 std::vector<std::string> SensorsSeeds();
 bool FuzzMeasured(std::string_view bytes);

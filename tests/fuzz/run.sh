@@ -11,7 +11,7 @@ executions=$2
 shift 2
 targets=("$@")
 if [ ${#targets[@]} -eq 0 ]; then
-  targets=(pbrt gltf mitsuba obj ply sensors measured image accumulation block radii guide slice checkpoint sums record manifest messages)
+  targets=(pbrt gltf mitsuba obj ply view sensors measured image accumulation block radii guide slice checkpoint sums record manifest messages)
 fi
 failed=0
 for target in "${targets[@]}"; do

@@ -90,6 +90,14 @@ std::vector<std::string> PlySeeds() {
   return SeedsOf("fuzz/seeds/ply");
 }
 
+bool FuzzView(std::string_view bytes) {
+  return IsSoundOrRefused(SceneFromBytes(bytes, "fuzz.view.json"));
+}
+
+std::vector<std::string> ViewSeeds() {
+  return SeedsOf("fuzz/seeds/view");
+}
+
 bool FuzzSensors(std::string_view bytes) {
   return IsSoundOrRefused(SceneFromBytes(bytes, "fuzz.ply"));
 }

@@ -96,8 +96,9 @@ struct Surface {
   Color coat_albedo{};  // of one scattering in it; over a metal Rec. 709
   double phase_g = 0;   // its mean cosine
   bool is_base_smooth = false;
-  double base_alpha_u = 0, base_alpha_v = 0;  // of the metal under a coat
-  ReferenceFibre fibre;                       // hair
+  double base_alpha_u = 0, base_alpha_v = 0;     // of the metal under a coat
+  ReferenceFibre fibre;                          // hair
+  Color reflection_tint{}, transmission_tint{};  // metals and dielectrics
   // Below a surface.
   const SubsurfaceTable* below = nullptr;
   Color extinction{};
@@ -155,6 +156,8 @@ Surface SurfaceOf(const Scene& scene, const SurfacePoint& point) {
   surface.fibre = {static_cast<double>(material.ior), static_cast<double>(material.beta_m),
                    static_cast<double>(material.beta_n), static_cast<double>(material.scale_tilt),
                    Working(FromFloat(material.absorption))};
+  surface.reflection_tint = Working(FromFloat(material.reflection_tint));
+  surface.transmission_tint = Working(FromFloat(material.transmission_tint));
   surface.below = material.below;
   surface.extinction = Working(FromFloat(material.extinction));
   if (material.texture != kNoTexture) {
@@ -415,7 +418,7 @@ bool Scatter(const Surface& surface, Double3 wo, const std::array<double, 3>& u,
     const double once = DielectricReflectance(std::min(1.0, up.z), surface.ior, cos_t);
     const double reflected = once + (1 - once) * (1 - once) * once / (1 - once * once);
     out.wi = u[0] < reflected ? Double3{-wo.x, -wo.y, wo.z} : wo * -1;
-    out.weight = {1, 1, 1};
+    out.weight = u[0] < reflected ? surface.reflection_tint : surface.transmission_tint;
     return true;
   }
   if (surface.kind == Material::Kind::kDiffuseTransmission) {
@@ -437,7 +440,8 @@ bool Scatter(const Surface& surface, Double3 wo, const std::array<double, 3>& u,
   if (surface.kind == Material::Kind::kConductor) {
     if (!(reflected.z > 0)) return false;
     out.wi = reflected * side;
-    out.weight = Times(Working(MetalColor(surface, cos_m)), weight_of(reflected));
+    out.weight = Times(Times(Working(MetalColor(surface, cos_m)), surface.reflection_tint),
+                       weight_of(reflected));
     return true;
   }
   const double eta = wo.z > 0 ? surface.ior : 1 / surface.ior;
@@ -445,16 +449,14 @@ bool Scatter(const Surface& surface, Double3 wo, const std::array<double, 3>& u,
   if (u[0] < DielectricReflectance(std::min(1.0, cos_m), eta, cos_t)) {
     if (!(reflected.z > 0)) return false;
     out.wi = reflected * side;
-    const double weight = weight_of(reflected);
-    out.weight = {weight, weight, weight};
+    out.weight = Times(surface.reflection_tint, weight_of(reflected));
     return true;
   }
   const Double3 refracted = m * (cos_m / eta - cos_t) - up * (1 / eta);
   if (!(refracted.z < 0)) return false;
   out.wi = refracted * side;
   out.index = eta;
-  const double weight = weight_of(refracted) / (eta * eta);
-  out.weight = {weight, weight, weight};
+  out.weight = Times(surface.transmission_tint, weight_of(refracted) / (eta * eta));
   return true;
 }
 

@@ -126,6 +126,21 @@ void AddQuad(Scene& scene, Vec3 corner, Vec3 edge1, Vec3 edge2, std::int32_t mat
   scene.meshes.push_back(mesh);
 }
 
+std::int32_t AddStripes(Scene& scene, float first, float second, const TextureMapping& mapping) {
+  const auto number = static_cast<std::int32_t>(scene.textures.size());
+  for (const float value : {first, second}) {
+    Texture constant;
+    constant.color = Gray(value);
+    scene.textures.push_back(constant);
+  }
+  Texture stripes;
+  stripes.kind = Texture::Kind::kCheckerboard;
+  stripes.parts = {number, number + 1, -1, -1};
+  stripes.mapping = mapping;
+  scene.textures.push_back(stripes);
+  return number + 2;
+}
+
 void AddBox(Scene& scene, Vec3 low, Vec3 high, std::int32_t material) {
   TriangleMesh mesh;
   for (int corner = 0; corner < 8; ++corner) {

@@ -42,6 +42,9 @@ std::int32_t AddAreaLight(Scene& scene, float radiance, bool two_sided = false);
 // A parallelogram of two triangles; the outward normal is along edge1 × edge2.
 void AddQuad(Scene& scene, Vec3 corner, Vec3 edge1, Vec3 edge2, std::int32_t material,
              std::int32_t area_light = kNoAreaLight);
+// A texture of numbers: `first` and `second` by turns, where the first coordinate of `mapping` is
+// from an even whole number on and from an odd one. Returns its number.
+std::int32_t AddStripes(Scene& scene, float first, float second, const TextureMapping& mapping);
 // Twelve triangles, normals outward.
 void AddBox(Scene& scene, Vec3 low, Vec3 high, std::int32_t material);
 void AddSphere(Scene& scene, Vec3 center, float radius, std::int32_t material,

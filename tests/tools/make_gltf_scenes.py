@@ -34,7 +34,7 @@ class Document:
         return len(self.json["bufferViews"]) - 1
 
     def accessor(self, numbers, kind, component=5126):
-        size = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}[kind]
+        size = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}[kind]
         code = {5126: "f", 5123: "H", 5121: "B", 5120: "b"}[component]
         entry = {"bufferView": self.view(struct.pack(f"<{len(numbers)}{code}", *numbers)),
                  "componentType": component, "count": len(numbers) // size, "type": kind}
@@ -338,6 +338,40 @@ def seed():
     return d
 
 
+def skinned_seed():
+    """A mesh with a skin and morph targets, and one with the mesh's own weights."""
+    d = Document()
+    positions = d.accessor([0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 1, 0], "VEC3")
+    normals = d.accessor([0, 0, 1] * 4, "VEC3")
+    attributes = {"POSITION": positions, "NORMAL": normals}
+    joints = d.accessor([0, 1, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 9], "VEC4", 5121)
+    weights = d.accessor([0.5, 0.25, 0, 0] + [1, 0, 0, 0] * 2 + [0, 0, 0, 0], "VEC4")
+    up = d.accessor([0, 0, 1] * 4, "VEC3")
+    nothing = d.add("accessors", {"componentType": 5126, "count": 4, "type": "VEC3"})
+    identity = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]
+    binds = d.accessor(identity[:12] + [0, 0, 3, 1] + identity, "MAT4")
+    targets = [{"POSITION": up, "NORMAL": up}, {"POSITION": nothing}]
+    skin = {"JOINTS_0": joints, "WEIGHTS_0": weights, "JOINTS_1": joints, "WEIGHTS_1": weights}
+    d.json["meshes"] = [
+        {"primitives": [{"attributes": {**attributes, **skin}, "mode": 5, "targets": targets}],
+         "weights": [0.5, 1]}]
+    d.json["cameras"] = [{"type": "perspective", "perspective": {"yfov": 1, "znear": 0.1}}]
+    d.json["nodes"] = [
+        {"mesh": 0, "skin": 0, "weights": [0.25, 0]}, {"mesh": 0, "translation": [2, 0, 0]},
+        {"children": [3], "extensions": {"KHR_node_visibility": {"visible": False}}},
+        {"rotation": [0, 0.6, 0, 0.8], "mesh": 0}, {"camera": 0, "translation": [0, 0, 5]}]
+    d.json["skins"] = [{"joints": [3, 2], "inverseBindMatrices": binds}]
+    d.json["scenes"] = [{"nodes": [0, 1, 2, 4]}]
+    d.json["extensionsUsed"] = ["KHR_node_visibility"]
+    return d
+
+
+def write_text_seed(path, document):
+    """With the buffer within the text, and no spaces."""
+    document.text("data:application/octet-stream;base64," + base64.b64encode(document.buffer).decode())
+    path.write_bytes(json.dumps(document.json, separators=(",", ":")).encode())
+
+
 def main():
     tests = pathlib.Path(sys.argv[1] if len(sys.argv) > 1 else
                          pathlib.Path(__file__).resolve().parent.parent)
@@ -348,9 +382,8 @@ def main():
     seeds.mkdir(parents=True, exist_ok=True)
     small = seed()
     (seeds / "whole.glb").write_bytes(small.glb())
-    data = "data:application/octet-stream;base64," + base64.b64encode(small.buffer).decode()
-    small.text(data)
-    (seeds / "whole.gltf").write_bytes(json.dumps(small.json, separators=(",", ":")).encode())
+    write_text_seed(seeds / "whole.gltf", small)
+    write_text_seed(seeds / "skinned.gltf", skinned_seed())
 
 
 if __name__ == "__main__":

@@ -49,6 +49,22 @@ Material FittedCoat(Material material, float widest, float here) {
   return one[0];
 }
 
+Material Tinted(Material material) {
+  material.reflection_tint = {0.9F, 0.5F, 0.1F};
+  material.transmission_tint = {0.2F, 0.7F, 0.4F};
+  material.is_tinted = true;
+  return material;
+}
+
+// A coat that passes what it does not reflect.
+Material Passing(Material material) {
+  material.coat_passes_rest = true;
+  material.thickness = 0;
+  std::vector<Material> one = {material};
+  PrepareCoats(one);
+  return one[0];
+}
+
 const Rgb kGoldEta = {0.15F, 0.4F, 1.4F};
 const Rgb kGoldK = {3.5F, 2.4F, 1.8F};
 
@@ -78,6 +94,12 @@ std::vector<Material> RoughMaterials() {
           SheetMaterial(0.3F, 0.6F),
           OnePart(SheetMaterial(0.3F, 0.6F), Parts::kFirst),
           OnePart(SheetMaterial(0.3F, 0.6F), Parts::kSecond),
+          Passing(CoatedMaterial(0.7F, 0.3F)),
+          Passing(CoatedMaterial(0.7F, 1)),
+          OnePart(Passing(CoatedMaterial(0.9F, 0)), Parts::kSecond),
+          FittedCoat(Passing(CoatedMaterial(0.7F, 0.3F)), 0.5F, 0.17F),
+          Tinted(ConductorMaterial(kGoldEta, kGoldK, 0.6F, 0.2F)),
+          Tinted(DielectricMaterial(1.5F, 0.6F)),
           FittedCoat(CoatedMaterial(0.7F, 0.3F, 0.1F), 0.5F, 0.17F),
           FittedCoat(CoatedMetal(kGoldEta, kGoldK, 0.3F, 0.2F, 0.1F), 0.4F, 0.23F)};
 }
@@ -284,6 +306,26 @@ TEST(ThinDielectricTest, ReflectsAllOrdersAndSendsTheRestStraightOn) {
     ASSERT_TRUE(SampleBsdf(sheet, wo, 0, 0, 0, Carried::kRadiance, sample));
     EXPECT_EQ(sample.wi, (Vec3{-wo.x, -wo.y, wo.z}));
   }
+}
+
+// What files multiply the two lobes of glass by, and the one of a metal.
+TEST(TintTest, MultipliesWhatIsReflectedAndWhatGoesThrough) {
+  BsdfSample sample;
+  for (const Material& glass : {Tinted(DielectricMaterial(1.5F)), Tinted([] {
+                                  Material thin = DielectricMaterial(1.5F);
+                                  thin.kind = Material::Kind::kThinDielectric;
+                                  return thin;
+                                }())}) {
+    ASSERT_TRUE(SampleBsdf(glass, Direction(30, 0), 0, 0, 0, Carried::kFlux, sample));
+    EXPECT_EQ(sample.weight, glass.reflection_tint);
+    ASSERT_TRUE(SampleBsdf(glass, Direction(30, 0), 0.999F, 0, 0, Carried::kFlux, sample));
+    EXPECT_EQ(sample.weight, glass.transmission_tint);
+  }
+  const Material metal = ConductorMaterial(kGoldEta, kGoldK, 0, 0);
+  BsdfSample of_tinted;
+  ASSERT_TRUE(SampleBsdf(metal, Direction(30, 0), 0, 0, 0, Carried::kFlux, sample));
+  ASSERT_TRUE(SampleBsdf(Tinted(metal), Direction(30, 0), 0, 0, 0, Carried::kFlux, of_tinted));
+  EXPECT_EQ(of_tinted.weight, sample.weight * Tinted(metal).reflection_tint);
 }
 
 TEST(SmoothDielectricTest, BendsBySnellAndCompressesRadianceOnly) {

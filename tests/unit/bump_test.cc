@@ -102,8 +102,8 @@ TEST(BumpTest, EvenHeightsChangeNothing) {
   ExpectNear(point.shading_normal, before, 1e-5F);
 }
 
-TEST(BumpTest, ANormalMapSaysTheNormal) {
-  Scene scene;
+// A material of the first texture, which says the normal (0.36, -0.48, 0.8) everywhere.
+Material AddNormalMap(Scene& scene) {
   Picture picture;
   picture.width = picture.height = 1;
   picture.linear = {0.68F, 0.26F, 0.9F};
@@ -113,6 +113,12 @@ TEST(BumpTest, ANormalMapSaysTheNormal) {
   scene.textures = {map};
   Material material = DiffuseMaterial(0.5F);
   material.normal_map = 0;
+  return material;
+}
+
+TEST(BumpTest, ANormalMapSaysTheNormal) {
+  Scene scene;
+  const Material material = AddNormalMap(scene);
   // u along y, so that local x is world y and local y is world -x.
   AddQuad(scene, {-2, -2, 0}, {4, 0, 0}, {0, 4, 0}, AddMaterial(scene, material));
   scene.meshes.back().uvs = {{0, 1}, {0, 0}, {1, 0}, {1, 1}};
@@ -120,6 +126,30 @@ TEST(BumpTest, ANormalMapSaysTheNormal) {
   std::optional<Material> storage;
   (void)MaterialAt(scene, point, {0, 0, 1}, storage);
   ExpectNear(point.shading_normal, {0.48F, 0.36F, 0.8F}, 1e-5F);
+}
+
+// A picture of normals that follows v stands out the same way where it is mirrored, whether by its
+// coordinates or by v; its slopes may be scaled.
+TEST(BumpTest, ANormalMapMayFollowVAndBeScaled) {
+  for (const bool is_smoothed : {false, true}) {
+    for (const float u_sign : {1.0F, -1.0F}) {
+      for (const float v_sign : {1.0F, -1.0F}) {
+        Scene scene;
+        Material material = AddNormalMap(scene);
+        material.normal_map_follows_v = true;
+        material.normal_scale = 2;
+        AddQuad(scene, {-2, -2, 0}, {4, 0, 0}, {0, 4, 0}, AddMaterial(scene, material));
+        scene.meshes.back().uvs = {{0, 0}, {u_sign, 0}, {u_sign, v_sign}, {0, v_sign}};
+        if (is_smoothed) scene.meshes.back().normals.assign(4, {0, 0, 1});
+        SurfacePoint point = Met(scene, {0.5F, 0.2F, 1}, {0, 0, -1});
+        std::optional<Material> storage;
+        (void)MaterialAt(scene, point, {0, 0, 1}, storage);
+        // (0.36, -0.48, 0.8), whose slopes are doubled.
+        const Vec3 expected = Normalize({u_sign * 0.72F, v_sign * -0.96F, 0.8F});
+        ExpectNear(point.shading_normal, expected, 1e-5F);
+      }
+    }
+  }
 }
 
 // A step along dpdu changes u alone, by as much.

@@ -58,6 +58,25 @@ TEST(SceneEmissionTest, WhatWorkersCountPassesForEverySceneOfTheTests) {
   EXPECT_GE(scenes, 10);
 }
 
+// Of a light whose alpha is a texture some photons carry nothing: nearly none, or half of them.
+TEST(SceneEmissionTest, MaskedLightsPass) {
+  for (const float dark : {1.0F, 0.99F, 0.0F}) {
+    for (const float bright : {1.0F, 0.99F}) {
+      Scene scene = ManyLights();
+      TextureMapping halves;
+      halves.scale_u = 2;
+      const std::int32_t mask = AddStripes(scene, dark, bright, halves);
+      scene.meshes.back().uvs = {{0, 0}, {1, 0}, {1, 0.9F}, {0, 0.9F}};
+      scene.meshes.back().traits.alpha_texture = mask;
+      scene.spheres[0].traits.alpha_texture = mask;
+      LocalRender render(scene, SettingsFor(scene, FewPhotons()));
+      render.AddPass(1);
+      const Status checked = render.emission_check().Check(render.tally());
+      EXPECT_TRUE(checked.ok()) << dark << " " << bright << ": " << checked.message();
+    }
+  }
+}
+
 // A red and a blue light have more power in some passes and less in others: what workers count
 // passes in all, and what no pass can have does not.
 TEST(SceneEmissionTest, LightsOfSaturatedColorsPassAtAllWavelengths) {

@@ -255,9 +255,31 @@ TEST(AlphaTest, AShareOfRaysMeetsTheShape) {
     EXPECT_NEAR(count, kRays * share, 5 * std::sqrt(kRays * share * (1 - share)));
   };
   near(on_mesh, 0.3);
-  // Both sides of the sphere are one shape: a ray passes through it as a whole.
-  near(on_sphere, 0.7 * 0.6);
+  // Who passes the near wall of the sphere may meet the far one.
+  near(on_sphere, 0.7 * (0.6 + 0.4 * 0.6));
   near(shadowed, 0.3);
+}
+
+// Half of a ball is there: through the hole its other wall is seen, from inside.
+TEST(AlphaTest, ThroughAHoleTheOtherWallIsMet) {
+  Scene scene;
+  AddMaterial(scene, DiffuseMaterial(0.5F));
+  AddSphere(scene, {0, 0, 0}, 1, 0);
+  TextureMapping by_z;
+  by_z.kind = TextureMapping::Kind::kPlanar;
+  by_z.axis_u = {0, 0, 0.5F};
+  by_z.axis_v = {};
+  // Whole numbers are even above z = 0.
+  scene.spheres[0].traits.alpha_texture = AddStripes(scene, 0, 1, by_z);
+  const auto intersector = Intersector::Create(scene).value();
+  const Ray down = {{0.6F, 0, 3}, {0, 0, -1}, HUGE_VALF};
+  Hit hit;
+  ASSERT_TRUE(intersector->Intersect(down, hit));
+  EXPECT_NEAR(hit.t, 3.8F, 1e-5F);
+  EXPECT_TRUE(intersector->Occluded(down));
+  EXPECT_FALSE(intersector->Occluded({down.origin, {0, 0, -3.7F}, 1}));
+  ASSERT_TRUE(intersector->Intersect({{0.6F, 0, -3}, {0, 0, 1}, HUGE_VALF}, hit));
+  EXPECT_NEAR(hit.t, 2.2F, 1e-5F);
 }
 
 // Light with an alpha of zero is not seen, and lights as without.

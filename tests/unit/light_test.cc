@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <memory>
+#include <numbers>
 #include <utility>
 #include <vector>
 
@@ -598,6 +599,89 @@ TEST(SampleEmissionTest, FillsTheSceneFromInfinity) {
   // Both faces of the disk of radius 0.5.
   const double expected = 2 * kPi64 * (2 * kPi64 * 0.25);
   EXPECT_NEAR(through, expected, 4 * std::sqrt(squares / kPhotons));
+}
+
+// A rectangle whose alpha leaves its second half along x; or that half alone, of as much radiance.
+Scene HalfLight(bool is_masked) {
+  Scene scene = BlackRoom();
+  const std::int32_t light = AddAreaLight(scene, 3);
+  AddQuad(scene, {-2, -2, 0}, {4, 0, 0}, {0, 4, 0}, 0);
+  AddQuad(scene, {is_masked ? -1.0F : 0.0F, -1, 2}, {0, 2, 0}, {is_masked ? 2.0F : 1.0F, 0, 0}, 0,
+          light);
+  if (!is_masked) return scene;
+  TextureMapping halves;
+  halves.scale_u = 2;
+  scene.meshes.back().uvs = {{0, 0}, {0, 0.9F}, {1, 0.9F}, {1, 0}};
+  scene.meshes.back().traits.alpha_texture = AddStripes(scene, 0, 1, halves);
+  return scene;
+}
+
+// By strata of the three numbers, some of which the masked half's edge cuts: within 1 %.
+TEST(SampleDirectTest, OfAMaskedLightIsThatOfWhatIsLeft) {
+  const auto irradiance = [](const Scene& scene) {
+    const Lit lit(scene);
+    constexpr int kSide = 64;
+    double sum = 0;
+    for (int i = 0; i < kSide * kSide * kSide; ++i) {
+      const auto at = [](int part) { return (static_cast<float>(part % kSide) + 0.5F) / kSide; };
+      const auto choice = static_cast<double>(at(i / (kSide * kSide)));
+      LightSample sample;
+      if (lit.lights.SampleDirect({{0.3F, 0.2F, 0}, {0, 0, 1}}, choice, at(i), at(i / kSide),
+                                  sample)) {
+        sum += static_cast<double>(sample.radiance_over_pdf.g * sample.wi.z);
+      }
+    }
+    return sum / (static_cast<double>(kSide) * kSide * kSide);
+  };
+  const double expected = irradiance(HalfLight(false));
+  EXPECT_GT(expected, 0);
+  EXPECT_NEAR(irradiance(HalfLight(true)), expected, 0.01 * expected);
+}
+
+// A ball of alpha a that shines on both sides: a ray that looks at it meets the near wall with
+// probability a, else the far one with a again, and both shine L. Where the eye cannot find them,
+// they are sampled: without shadows L a from each.
+TEST(SampleDirectTest, FindsBothWallsOfABallThatIsSeenThrough) {
+  Scene scene = BlackRoom();
+  AddSphere(scene, {0, 0, 3}, 1, 0, AddAreaLight(scene, 2, true));
+  scene.spheres[0].traits.alpha = 0.25F;
+  const Lit lit(scene);
+  // Of a cone of sin θ = 1/3 around the normal: π sin²θ · L · a, from two walls.
+  const double expected = 2 * std::numbers::pi / 9 * 2 * 0.25;
+  constexpr int kSide = 1024;
+  double sum = 0;
+  for (int i = 0; i < kSide * kSide; ++i) {
+    const auto at = [](int part) { return (static_cast<float>(part % kSide) + 0.5F) / kSide; };
+    LightSample sample;
+    if (lit.lights.SampleDirect({{0, 0, 0}, {0, 0, 1}}, 0.5, at(i), at(i / kSide), sample))
+      sum += static_cast<double>(sample.radiance_over_pdf.g * sample.wi.z);
+  }
+  EXPECT_NEAR(sum / (static_cast<double>(kSide) * kSide), expected, 2e-3 * expected);
+}
+
+TEST(SampleEmissionTest, OfAMaskedLightLeavesWhatIsThereAlone) {
+  const Lit whole(HalfLight(false));
+  const Lit masked(HalfLight(true));
+  // At 256 x 256 places, and a little more.
+  const float ratio = masked.lights.TotalPower().g / whole.lights.TotalPower().g;
+  EXPECT_GE(ratio, 1);
+  EXPECT_LT(ratio, 1.01F);
+  KeyedRng rng(3);
+  double sum = 0;
+  constexpr int kPhotons = 1 << 16;
+  for (int i = 0; i < kPhotons; ++i) {
+    const double choice = static_cast<double>(rng.Uniform());
+    const float u1 = rng.Uniform();
+    const float u2 = rng.Uniform();
+    const float u3 = rng.Uniform();
+    Emission emission;
+    if (!masked.lights.SampleEmission(choice, u1, u2, u3, rng.Uniform(), emission)) continue;
+    EXPECT_GE(emission.ray.origin.x, 0);
+    sum += static_cast<double>(emission.flux.g);
+  }
+  // Half of the photons carry twice the mean: the deviation is 1 / 256 of it.
+  const auto power = static_cast<double>(whole.lights.TotalPower().g);
+  EXPECT_NEAR(sum / kPhotons, power, 4 * power / 256);
 }
 
 // Of two lights as bright at the origin, one has 1e-12 of the power: half of what is not drawn

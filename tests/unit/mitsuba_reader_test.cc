@@ -22,6 +22,7 @@ namespace lucerna {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::Not;
 using Files = std::map<std::string, std::string>;
 
 std::string Said(const ParsedScene& parsed) {
@@ -414,6 +415,28 @@ TEST(MitsubaReaderTest, LightsHaveTheStrengthThatIsGiven) {
   EXPECT_GT(EdgeCross(scene.meshes[0], 0).z, 0);
 }
 
+TEST(MitsubaReaderTest, AnAreaLightMayShowAPicture) {
+  const Scene scene = SceneOf(
+      "<shape type='rectangle'><emitter type='area'><texture type='bitmap' name='radiance'>"
+      "<string name='filename' value='two.pfm'/><string name='wrap_mode' value='mirror'/>"
+      "<transform name='to_uv'><scale x='2' y='1'/></transform></texture></emitter></shape>",
+      {{"two.pfm", [] {
+          std::string pfm = "PF\n2 1\n-1\n";
+          const std::array<float, 6> pixels = {0, 0, 0, 3, 2, 1};
+          pfm.append(reinterpret_cast<const char*>(pixels.data()), sizeof(pixels));
+          return pfm;
+        }()}});
+  ASSERT_EQ(scene.area_lights.size(), 1U);
+  const AreaLight& light = scene.area_lights[0];
+  ASSERT_NE(light.picture, nullptr);
+  EXPECT_EQ(light.largest_pixel, 3);
+  EXPECT_EQ(light.wrap_u, Texture::Wrap::kMirror);
+  // The second pixel is around u = 3/8 and, mirrored, 5/8.
+  EXPECT_EQ(light.PixelAt({0.375F, 0.5F}), (Rgb{3, 2, 1}));
+  EXPECT_EQ(light.PixelAt({0.625F, 0.5F}), (Rgb{3, 2, 1}));
+  EXPECT_EQ(light.PixelAt({0.125F, 0.5F}), Rgb());
+}
+
 TEST(MitsubaReaderTest, ALightThatIsTheSameAtAllWavelengthsHasItsValueAsLuminance) {
   const Scene scene =
       SceneOf("<emitter type='point'><spectrum name='intensity' value='360:4, 830:4'/></emitter>");
@@ -652,6 +675,544 @@ TEST(MitsubaReaderTest, SerializedMeshesAreRead) {
   }
 }
 
+// ---- How long paths become, and what else a view says
+
+// The whole of a scene around an integrator.
+ParsedScene WithIntegrator(const std::string& integrator) {
+  return ReadXml(Around(integrator + "<shape type='sphere'/>"));
+}
+
+TEST(MitsubaReaderTest, PathsWithoutAMaximumAreLong) {
+  for (const std::string integrator :
+       {"", "<integrator type='path'/>",
+        "<integrator type='path'><integer name='max_depth' value='-1'/></integrator>"}) {
+    const ParsedScene parsed = WithIntegrator(integrator);
+    ASSERT_TRUE(parsed.ok()) << Said(parsed);
+    EXPECT_EQ(parsed.scene.integrator.max_depth, 1000) << integrator;
+    EXPECT_THAT(Said(parsed), Not(HasSubstr("warning"))) << integrator;
+  }
+}
+
+TEST(MitsubaReaderTest, MaximaOfPathsAreHeldWithinTheirRange) {
+  for (const auto& [given, held] :
+       {std::pair{"1", 1}, {"0", 1}, {"2", 1}, {"10001", 10'000}, {"20000", 10'000}}) {
+    const ParsedScene parsed =
+        WithIntegrator("<integrator type='path'><integer name='maxDepth' value='" +
+                       std::string(given) + "'/></integrator>");
+    ASSERT_TRUE(parsed.ok()) << Said(parsed);
+    EXPECT_EQ(parsed.scene.integrator.max_depth, held) << given;
+    const bool is_within = given == std::string("2") || given == std::string("10001");
+    EXPECT_EQ(Said(parsed).find("\"maxDepth\" of <integrator") == std::string::npos, is_within)
+        << given << Said(parsed);
+  }
+}
+
+TEST(MitsubaReaderTest, IntegratorsThatRenderSomethingElseAreWarnedOf) {
+  for (const std::string type : {"direct", "ao", "depth"}) {
+    EXPECT_THAT(Said(WithIntegrator("<integrator type='" + type + "'/>")),
+                HasSubstr("warning: <integrator type=\"" + type + "\"> is not what is rendered"));
+  }
+  EXPECT_THAT(Said(WithIntegrator("<integrator type='aov'><integrator type='path'/></integrator>")),
+              HasSubstr("its layers are not written"));
+  EXPECT_THAT(Said(WithIntegrator("<integrator type='path'><boolean name='hide_emitters' "
+                                  "value='true'/></integrator>")),
+              HasSubstr("\"hide_emitters\" of <integrator type=\"path\"> is ignored"));
+}
+
+ParsedScene WithSensor(const std::string& values) {
+  return ReadXml("<scene version='0.6.0'><sensor type='perspective'>" + values +
+                 "</sensor><emitter type='constant'/><shape type='sphere'/></scene>");
+}
+
+TEST(MitsubaReaderTest, ClippingAndShiftsThatChangeAViewAreWarnedOf) {
+  EXPECT_THAT(Said(WithSensor(Float("nearClip", 0.01) + Float("farClip", 1e4) +
+                              Float("principal_point_offset_x", 0))),
+              Not(HasSubstr("warning")));
+  for (const std::string name : {"nearClip", "farClip", "principal_point_offset_x"}) {
+    EXPECT_THAT(Said(WithSensor(Float(name, 3))),
+                HasSubstr("\"" + name + "\" of <sensor type=\"perspective\"> is ignored"));
+  }
+}
+
+TEST(MitsubaReaderTest, AFocalLengthMayHaveAFraction) {
+  const ParsedScene parsed = WithSensor("<string name='focalLength' value='35.5mm'/>");
+  ASSERT_TRUE(parsed.ok()) << Said(parsed);
+  // Of half the diagonal of the film, 36 by 24 mm, in that of 768 by 576 pixels.
+  const double expected = std::hypot(36, 24) / 2 / 35.5 * 576 / std::hypot(768, 576);
+  EXPECT_NEAR(std::tan(parsed.scene.camera.fov_deg / 2 * M_PI / 180), expected, 1e-9);
+}
+
+// ---- Shapes without a bsdf, and those of nothing
+
+TEST(MitsubaReaderTest, AShapeWithoutABsdfIsGreyOrBlackOrNothing) {
+  const auto material_of = [](const std::string& in_shape, std::string_view version) {
+    const Scene scene =
+        SceneOf("<medium type='homogeneous' id='m'/><shape type='sphere'>" + in_shape + "</shape>",
+                {}, version);
+    return scene.materials.at(static_cast<std::size_t>(scene.spheres.at(0).traits.material));
+  };
+  const std::string light = "<emitter type='area'/>";
+  const std::string medium = "<ref name='interior' id='m'/>";
+  EXPECT_EQ(material_of("", "3.0.0").reflectance, Gray(0.5F));
+  EXPECT_EQ(material_of(light, "3.0.0").reflectance, Rgb());
+  EXPECT_EQ(material_of(light, "0.6.0").reflectance, Rgb());
+  EXPECT_EQ(material_of(medium, "3.0.0").kind, Material::Kind::kDiffuse);
+  EXPECT_EQ(material_of(medium, "0.6.1").kind, Material::Kind::kDiffuse);
+  EXPECT_EQ(material_of(medium, "0.6.0").kind, Material::Kind::kInterface);
+  EXPECT_EQ(material_of(medium, "0.4").kind, Material::Kind::kInterface);
+  EXPECT_EQ(material_of(medium + light, "0.6.0").kind, Material::Kind::kDiffuse);
+}
+
+TEST(MitsubaReaderTest, LightsOfNothingShineAndAreBlack) {
+  const ParsedScene parsed = ReadXml(
+      Around("<shape type='sphere'><bsdf type='null'/><emitter type='area'><rgb name='radiance' "
+             "value='7'/></emitter></shape>"));
+  ASSERT_TRUE(parsed.ok()) << Said(parsed);
+  EXPECT_THAT(Said(parsed), HasSubstr("light does not pass through it"));
+  const ShapeTraits& traits = parsed.scene.spheres.at(0).traits;
+  const Material& material = parsed.scene.materials.at(static_cast<std::size_t>(traits.material));
+  EXPECT_EQ(material.kind, Material::Kind::kDiffuse);
+  EXPECT_EQ(material.reflectance, Rgb());
+  ASSERT_NE(traits.area_light, kNoAreaLight);
+  ExpectNear(parsed.scene.area_lights.at(static_cast<std::size_t>(traits.area_light)).radiance,
+             Gray(7));
+}
+
+// ---- More of textures
+
+TEST(MitsubaReaderTest, NormalMapsLieAsTheirTextureSays) {
+  const Scene scene = SceneOf(
+      "<shape type='rectangle'><bsdf type='normalmap'><texture type='scale'><float name='scale' "
+      "value='0.5'/><texture type='bitmap' name='x'><string name='filename' value='four.pfm'/>"
+      "<string name='wrapModeU' value='clamp'/><string name='wrapModeV' value='mirror'/>"
+      "<float name='uscale' value='4'/><float name='voffset' value='0.25'/></texture></texture>"
+      "<bsdf type='diffuse'/></bsdf></shape>",
+      {{"four.pfm", kFourPixels}}, "0.6.0");
+  const Material& material =
+      scene.materials.at(static_cast<std::size_t>(scene.meshes.at(0).traits.material));
+  ASSERT_NE(material.normal_map, kNoTexture);
+  const Texture& map = scene.textures.at(static_cast<std::size_t>(material.normal_map));
+  EXPECT_EQ(map.wrap_u, Texture::Wrap::kClamp);
+  EXPECT_EQ(map.wrap_v, Texture::Wrap::kMirror);
+  EXPECT_EQ(map.scale, 0.5F);
+  EXPECT_EQ(map.mapping.scale_u, 4);
+  EXPECT_EQ(map.mapping.scale_v, 1);
+  // v + 0.25 from the top is -0.25 from the bottom.
+  EXPECT_EQ(map.mapping.delta_v, -0.25F);
+}
+
+TEST(MitsubaReaderTest, TexturesMayBeTurned) {
+  // (u, v) -> (-v, u).
+  for (const std::string to_uv :
+       {"<rotate z='1' angle='90'/>", "<matrix value='0 -1 0 1 0 0 0 0 1'/>"}) {
+    const Scene scene =
+        SceneOf(Textured("<texture type='bitmap' name='reflectance'><string name='filename' "
+                         "value='four.pfm'/><transform name='to_uv'>" +
+                         to_uv + "</transform></texture>"),
+                {{"four.pfm", kFourPixels}});
+    ExpectNear(ColorAt(scene, 0.25F, 0.25F), {0, 1, 0});  // at (0.75, 0.25)
+    ExpectNear(ColorAt(scene, 0.25F, 0.75F), {1, 0, 0});  // at (0.25, 0.25)
+    ExpectNear(ColorAt(scene, 0.75F, 0.75F), {0, 0, 1});  // at (0.25, 0.75)
+    ExpectNear(ColorAt(scene, 0.75F, 0.25F), {1, 1, 1});  // at (0.75, 0.75)
+  }
+  const Scene board = SceneOf(
+      Textured("<texture type='checkerboard' name='reflectance'><rgb name='color0' value='.8'/>"
+               "<rgb name='color1' value='.1'/><transform name='to_uv'><rotate z='1' angle='-90'/>"
+               "<scale x='1' y='3'/><translate x='1'/></transform></texture>"));
+  for (int i = 0; i < 400; ++i) {
+    const float u = (static_cast<float>(i % 20) + 0.5F) / 20;
+    const float v = (static_cast<float>(i / 20) + 0.5F) / 20;
+    const int cells =
+        static_cast<int>(std::floor(2 * (v + 1))) + static_cast<int>(std::floor(2 * 3 * -u));
+    EXPECT_FLOAT_EQ(ColorAt(board, u, v).g, cells % 2 == 0 ? 0.8F : 0.1F) << u << " " << v;
+  }
+}
+
+TEST(MitsubaReaderTest, PicturesMayBeMirroredBeyondTheirEdges) {
+  const Scene scene =
+      SceneOf(Textured("<texture type='bitmap' name='reflectance'><string name='filename' "
+                       "value='four.pfm'/><string name='wrap_mode' value='mirror'/><transform "
+                       "name='to_uv'><translate x='1'/></transform></texture>"),
+              {{"four.pfm", kFourPixels}});
+  // Mitsuba's (0.25, 0.25) -> (1.25, 0.25), which is that of 0.75.
+  ExpectNear(ColorAt(scene, 0.25F, 0.25F), {0, 1, 0});
+}
+
+TEST(MitsubaReaderTest, AScaleMayHaveAColour) {
+  const Scene scene = SceneOf(
+      Textured("<texture type='scale' name='reflectance'><rgb name='scale' value='2 0.5 0.25'/>"
+               "<texture type='bitmap'><string name='filename' value='grey.pfm'/></texture>"
+               "</texture>"),
+      {{"grey.pfm",
+        [] {
+          std::string pfm = "PF\n1 1\n-1\n";
+          const std::array<float, 3> pixel = {0.25F, 0.5F, 0.5F};
+          pfm.append(reinterpret_cast<const char*>(pixel.data()), sizeof(pixel));
+          return pfm;
+        }()}},
+      "0.6.0");
+  ExpectNear(ColorAt(scene, 0.5F, 0.5F), {0.5F, 0.25F, 0.125F});
+}
+
+TEST(MitsubaReaderTest, TexturesThatNothingReadsAreWarnedOf) {
+  const std::string board = "<texture type='checkerboard'";
+  EXPECT_THAT(Said(ReadXml(Around(Textured(board + " name='diffuseReflectance'/>")))),
+              HasSubstr("unknown parameter \"diffuseReflectance\" of <bsdf type=\"diffuse\">"));
+  EXPECT_THAT(Said(ReadXml(Around(Textured(board + "/>")))),
+              HasSubstr("<texture type=\"checkerboard\"> in <bsdf type=\"diffuse\"> is ignored"));
+  EXPECT_THAT(Said(ReadXml(Around(Textured(board + " name='reflectance'/>" +
+                                           "<rgb name="
+                                           "'reflectance' value='1'/>")))),
+              HasSubstr("is given twice"));
+}
+
+// ---- Colours by wavelength
+
+TEST(MitsubaReaderTest, SpectraOfATypeAreWhatTheyAreAsValues) {
+  const auto reflectance = [](const std::string& spectrum, std::string_view version = "3.0.0") {
+    return MaterialOf("<bsdf type='diffuse'>" + spectrum + "</bsdf>", version);
+  };
+  const MaterialNumbers by_pairs =
+      reflectance("<spectrum name='reflectance' value='400:.1, 550:.2, 700:.6'/>");
+  EXPECT_EQ(reflectance("<spectrum name='reflectance' type='irregular'><string name='wavelengths' "
+                        "value='400, 550, 700'/><string name='values' value='.1, .2, .6'/>"
+                        "</spectrum>"),
+            by_pairs);
+  EXPECT_EQ(reflectance("<texture name='reflectance' type='regular'><float name='wavelength_min' "
+                        "value='400'/><integer name='wavelength_max' value='700'/><string "
+                        "name='values' value='.1 .2 .6'/></texture>"),
+            by_pairs);
+  const MaterialNumbers red = reflectance("<rgb name='reflectance' value='.6 .1 .2'/>");
+  EXPECT_EQ(reflectance("<spectrum name='reflectance' type='srgb'><rgb name='color' "
+                        "value='.6 .1 .2'/></spectrum>"),
+            red);
+  EXPECT_EQ(reflectance("<spectrum name='reflectance' value='.6 .1 .2'/>", "0.6.0"), red);
+  EXPECT_EQ(reflectance("<spectrum name='reflectance' type='uniform'><float name='value' "
+                        "value='.25'/></spectrum>"),
+            reflectance("<rgb name='reflectance' value='.25'/>"));
+  // A step.
+  EXPECT_NEAR(reflectance("<spectrum name='reflectance' value='360:.3, 550:.3, 550:.3, 830:.3'/>")
+                  .reflectance.g,
+              0.3F, 1e-4F);
+}
+
+TEST(MitsubaReaderTest, ASpectrumOfAPictureIsATexture) {
+  const Scene scene = SceneOf(Textured("<spectrum type='bitmap' name='reflectance'>"
+                                       "<string name='filename' value='four.pfm'/></spectrum>"),
+                              {{"four.pfm", kFourPixels}});
+  ExpectNear(ColorAt(scene, 0.75F, 0.25F), {0, 1, 0});
+}
+
+TEST(MitsubaReaderTest, LightsMayHaveTheSpectrumOfAFileOrABlackBody) {
+  const auto intensity = [](const std::string& spectrum, Files files = {}) {
+    return SceneOf("<emitter type='point'>" + spectrum + "</emitter>", std::move(files))
+        .point_lights.at(0)
+        .intensity;
+  };
+  ExpectNear(intensity("<spectrum name='intensity' filename='s.spd'/>",
+                       {{"s.spd", "# a light\n360 4\n550 4\n550 4\n830 4\n"}}),
+             intensity("<spectrum name='intensity' value='360:4, 830:4'/>"), 1e-3F);
+  ExpectNear(intensity("<spectrum name='intensity' type='d65'><float name='scale' value='3'/>"
+                       "</spectrum>"),
+             Gray(3));
+  // In watts as Mitsuba has it: by Planck's law at each wavelength.
+  std::string pairs;
+  for (int nm = 360; nm <= 830; nm += 2) {
+    const double metres = nm * 1e-9;
+    const double radiance =
+        2 * 6.62607015e-34 * 2.99792458e8 * 2.99792458e8 / std::pow(metres, 5) /
+        std::expm1(6.62607015e-34 * 2.99792458e8 / (metres * 1.380649e-23 * 5000)) * 1e-9 * 1e-3;
+    pairs += std::to_string(nm) + ":" + std::to_string(radiance) + " ";
+  }
+  const Rgb expected = intensity("<spectrum name='intensity' value='" + pairs + "'/>");
+  EXPECT_GT(Luminance(expected), 1);
+  ExpectNear(intensity("<blackbody name='intensity' temperature='5000K' scale='0.001'/>"), expected,
+             0.01F);
+  ExpectNear(intensity("<spectrum name='intensity' type='blackbody'><float name='temperature' "
+                       "value='5000'/><float name='scale' value='.001'/></spectrum>"),
+             expected, 0.01F);
+}
+
+// ---- More of materials and media
+
+TEST(MitsubaReaderTest, ADiffuseBsdfOfOldFilesHasTwoNamesForItsColour) {
+  EXPECT_EQ(MaterialOf("<bsdf type='diffuse'><rgb name='diffuseReflectance' value='.2'/></bsdf>",
+                       "0.6.0"),
+            MaterialOf("<bsdf type='diffuse'><rgb name='reflectance' value='.2'/></bsdf>"));
+}
+
+TEST(MitsubaReaderTest, WholeNumbersAreNumbers) {
+  EXPECT_EQ(MaterialOf("<bsdf type='roughdielectric'><integer name='alpha' value='1'/>"
+                       "<integer name='int_ior' value='2'/></bsdf>"),
+            MaterialOf("<bsdf type='roughdielectric'>" + Float("alpha", 1) + Float("int_ior", 2) +
+                       "</bsdf>"));
+  EXPECT_EQ(SceneOf("<shape type='sphere'><integer name='radius' value='2'/></shape>")
+                .spheres.at(0)
+                .radius,
+            2);
+  EXPECT_EQ(MaterialOf("<bsdf type='diffuse'><integer name='reflectance' value='1'/></bsdf>"),
+            MaterialOf("<bsdf type='diffuse'><rgb name='reflectance' value='1'/></bsdf>"));
+}
+
+TEST(MitsubaReaderTest, IndicesHaveNamesInAnyCase) {
+  const auto index_of = [](const std::string& name) {
+    return MaterialOf("<bsdf type='dielectric'><string name='int_ior' value='" + name +
+                      "'/><float name='ext_ior' value='1'/></bsdf>")
+        .ior;
+  };
+  EXPECT_EQ(index_of("BK7"), 1.5046F);
+  EXPECT_EQ(index_of("Silicone Oil"), 1.52045F);
+  EXPECT_EQ(index_of("glycerol"), 1.4729F);
+  EXPECT_EQ(index_of("bromine"), 1.661F);
+  EXPECT_EQ(index_of("carbon dioxide"), 1.00045F);
+  EXPECT_EQ(index_of("carbon tetrachloride"), 1.461F);
+}
+
+TEST(MitsubaReaderTest, TransformsMayBeRoundedOrTurnByNothing) {
+  const Scene scene = SceneOf(
+      "<shape type='rectangle'><transform name='to_world'><rotate angle='0'/>"
+      "<matrix value='1 0 0 3  0 1 0 0  0 0 1 0  1e-6 0 0 1.00001'/></transform></shape>");
+  ExpectNear(scene.meshes.at(0).positions.at(2), {4, 1, 0});
+}
+
+TEST(MitsubaReaderTest, ASecondSideIsWarnedOf) {
+  const ParsedScene parsed =
+      ReadXml(Around("<shape type='sphere'><bsdf type='twosided'><bsdf type='diffuse'/><bsdf "
+                     "type='conductor'/></bsdf></shape>"));
+  EXPECT_TRUE(parsed.ok()) << Said(parsed);
+  EXPECT_THAT(Said(parsed), HasSubstr("has a second bsdf, which is not used"));
+}
+
+TEST(MitsubaReaderTest, PhongIsAMixWithALobeOfItsWidth) {
+  const Scene scene = SceneOf(
+      "<shape type='sphere'><bsdf type='phong'><rgb name='diffuseReflectance' value='.3'/>"
+      "<rgb name='specularReflectance' value='.2 .1 .0'/><float name='exponent' value='48'/>"
+      "</bsdf></shape>",
+      {}, "0.6.0");
+  const Material& mix =
+      scene.materials.at(static_cast<std::size_t>(scene.spheres.at(0).traits.material));
+  ASSERT_EQ(mix.kind, Material::Kind::kMix);
+  EXPECT_FLOAT_EQ(mix.amount, 0.25F);
+  const Material& diffuse = scene.materials.at(static_cast<std::size_t>(mix.mixed[0]));
+  const Material& metal = scene.materials.at(static_cast<std::size_t>(mix.mixed[1]));
+  EXPECT_FLOAT_EQ(diffuse.reflectance.g * (1 - mix.amount), 0.3F);
+  EXPECT_EQ(metal.kind, Material::Kind::kConductor);
+  EXPECT_FLOAT_EQ(metal.alpha_u, 0.2F);
+  const MaterialNumbers same = PbrtMaterialOf("\"conductor\" \"rgb reflectance\" [.8 .4 0]");
+  ExpectNear(metal.k, same.k, 1e-3F);
+}
+
+TEST(MitsubaReaderTest, CoatingsAreThoseOfPbrt) {
+  const std::string ends = " \"float thickness\" 0 \"integer maxdepth\" 40";
+  EXPECT_EQ(
+      MaterialOf("<bsdf type='coating'><float name='int_ior' value='1.5'/><float "
+                 "name='ext_ior' value='1'/><bsdf type='twosided'><bsdf type='diffuse'>"
+                 "<rgb name='reflectance' value='.3'/></bsdf></bsdf></bsdf>"),
+      PbrtMaterialOf("\"coateddiffuse\" \"rgb reflectance\" [.3 .3 .3] \"float eta\" 1.5" + ends));
+  EXPECT_EQ(MaterialOf("<bsdf type='coating'><float name='int_ior' value='1.5'/><float "
+                       "name='ext_ior' value='1'/><bsdf type='roughconductor'><string "
+                       "name='material' value='Al'/><float name='alpha' value='.2'/></bsdf>"
+                       "</bsdf>"),
+            PbrtMaterialOf("\"coatedconductor\" \"spectrum conductor.eta\" \"metal-Al-eta\" "
+                           "\"spectrum conductor.k\" \"metal-Al-k\" \"float conductor.roughness\" "
+                           ".2 \"bool remaproughness\" false \"float interface.roughness\" 0 "
+                           "\"float interface.eta\" 1.5" +
+                           ends));
+}
+
+TEST(MitsubaReaderTest, FactorsOfLobesTintThem) {
+  const MaterialNumbers glass = MaterialOf(
+      "<bsdf type='dielectric'><rgb name='specular_reflectance' value='1, 0.5, 0'/>"
+      "<float name='specular_transmittance' value='0.25'/></bsdf>");
+  EXPECT_TRUE(glass.is_tinted);
+  EXPECT_EQ(glass.reflection_tint, (Rgb{1, 0.5F, 0}));
+  EXPECT_EQ(glass.transmission_tint, Gray(0.25F));
+  const MaterialNumbers metal = MaterialOf(
+      "<bsdf type='conductor'><string name='material' value='Al'/>"
+      "<rgb name='specular_reflectance' value='0.5, 0.6, 0.7'/></bsdf>");
+  EXPECT_EQ(metal.reflection_tint, (Rgb{0.5F, 0.6F, 0.7F}));
+  EXPECT_FALSE(MaterialOf("<bsdf type='thindielectric'/>").is_tinted);
+  // Without constants it is the reflectance.
+  const MaterialNumbers mirror = MaterialOf(
+      "<bsdf type='conductor'><rgb name='specular_reflectance' value='0.5, 0.6, 0.7'/></bsdf>");
+  EXPECT_FALSE(mirror.is_tinted);
+  EXPECT_GT(mirror.k.b, mirror.k.r);
+}
+
+TEST(MitsubaReaderTest, ThePrincipledBsdfIsWhatItsSharesAre) {
+  const MaterialNumbers plastic = MaterialOf(
+      "<bsdf type='principled'><rgb name='base_color' value='0.2, 0.4, 0.6'/>"
+      "<float name='roughness' value='0.5'/><float name='specular' value='0.5'/></bsdf>");
+  EXPECT_EQ(plastic.kind, Material::Kind::kCoatedDiffuse);
+  EXPECT_TRUE(plastic.coat_passes_rest);
+  EXPECT_FLOAT_EQ(plastic.alpha_u, 0.25F);
+  EXPECT_FLOAT_EQ(plastic.ior, 1.5F);
+  ExpectNear(plastic.reflectance, {0.2F, 0.4F, 0.6F});
+  const MaterialNumbers metal =
+      MaterialOf("<bsdf type='principled'><float name='metallic' value='1'/></bsdf>");
+  EXPECT_EQ(metal.kind, Material::Kind::kConductor);
+  EXPECT_FLOAT_EQ(metal.alpha_u, 0.25F);
+  const MaterialNumbers glass = MaterialOf(
+      "<bsdf type='principled'><rgb name='base_color' value='0.25, 1, 1'/>"
+      "<float name='spec_trans' value='1'/><float name='eta' value='1.6'/></bsdf>");
+  EXPECT_EQ(glass.kind, Material::Kind::kDielectric);
+  EXPECT_FLOAT_EQ(glass.ior, 1.6F);
+  EXPECT_EQ(glass.transmission_tint, (Rgb{0.5F, 1, 1}));
+  const Scene mixed = SceneOf(
+      "<shape type='sphere'><bsdf type='principled'><float name='metallic' value='0.3'/>"
+      "<float name='spec_trans' value='0.6'/></bsdf></shape>");
+  const Material& of_metal =
+      mixed.materials.at(static_cast<std::size_t>(mixed.spheres.at(0).traits.material));
+  ASSERT_EQ(of_metal.kind, Material::Kind::kMix);
+  EXPECT_FLOAT_EQ(of_metal.amount, 0.3F);
+  const Material& inner = mixed.materials.at(static_cast<std::size_t>(of_metal.mixed[0]));
+  ASSERT_EQ(inner.kind, Material::Kind::kMix);
+  EXPECT_FLOAT_EQ(inner.amount, 0.6F);
+  EXPECT_THAT(Said(ReadXml(Around("<shape type='sphere'><bsdf type='principled'>"
+                                  "<float name='clearcoat' value='0.5'/></bsdf></shape>"))),
+              HasSubstr("clearcoat"));
+}
+
+TEST(MitsubaReaderTest, VerticesOfPlyFilesMayHaveColours) {
+  const std::string ply =
+      "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+      "property float z\nproperty float r\nproperty float g\nproperty float b\n"
+      "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
+      "0 0 0 1 0 0\n1 0 0 0 1 0\n0 1 0 0 0 1\n3 0 1 2\n";
+  const std::string shape =
+      "<shape type='ply'><string name='filename' value='mesh.ply'/><bsdf type='diffuse'>";
+  const Scene scene =
+      SceneOf(shape +
+                  "<texture type='mesh_attribute' name='reflectance'>"
+                  "<string name='name' value='vertex_color'/></texture></bsdf></shape>",
+              {{"mesh.ply", ply}});
+  const TriangleMesh& mesh = scene.meshes.at(0);
+  EXPECT_EQ(mesh.colors, (std::vector<Rgb>{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}));
+  const Material& material = scene.materials.at(static_cast<std::size_t>(mesh.traits.material));
+  EXPECT_EQ(TextureColor(scene.textures, material.texture, {{}, {}, {}, {0.5F, 0.25F, 0}}),
+            (Rgb{0.5F, 0.25F, 0}));
+  // Where no texture shows them they take no memory.
+  EXPECT_TRUE(SceneOf(shape + "</bsdf></shape>", {{"mesh.ply", ply}}).meshes.at(0).colors.empty());
+}
+
+TEST(MitsubaReaderTest, AMixtureOfTwoIsAMix) {
+  const Scene scene = SceneOf(
+      "<shape type='sphere'><bsdf type='mixturebsdf'><string name='weights' value='0.7, 0.3'/>"
+      "<bsdf type='diffuse'/><bsdf type='conductor'/></bsdf></shape>",
+      {}, "0.6.0");
+  const Material& mix =
+      scene.materials.at(static_cast<std::size_t>(scene.spheres.at(0).traits.material));
+  ASSERT_EQ(mix.kind, Material::Kind::kMix);
+  EXPECT_FLOAT_EQ(mix.amount, 0.3F);
+  EXPECT_EQ(scene.materials.at(static_cast<std::size_t>(mix.mixed[1])).kind,
+            Material::Kind::kConductor);
+}
+
+TEST(MitsubaReaderTest, VolumesThatAreTheSameEverywhereMakeHomogeneousMedia) {
+  for (const std::string type : {"homogeneous", "heterogeneous"}) {
+    for (const std::string name : {"sigma_t", "density"}) {
+      if (type == "homogeneous" && name == "density") continue;
+      const Scene scene = SceneOf(
+          "<medium type='" + type + "' id='m'><volume name='" + name +
+          "' type='constvolume'><rgb name='value' value='4 2 1'/></volume><volume name='albedo' "
+          "type='constvolume'><float name='value' value='.5'/></volume></medium>"
+          "<shape type='cube'><bsdf type='null'/><ref name='interior' id='m'/></shape>");
+      ASSERT_EQ(scene.media.size(), 1U);
+      ExpectNear(scene.media[0].scattering, {2, 1, 0.5F});
+      ExpectNear(scene.media[0].absorption, {2, 1, 0.5F});
+    }
+  }
+}
+
+// ---- Texture coordinates of shapes
+
+// Mitsuba's texture coordinates of the vertex of a mesh that is nearest to a point.
+Vec2 UvNear(const TriangleMesh& mesh, Vec3 point, Vec3 normal) {
+  std::size_t nearest = 0;
+  const auto distance = [&](std::size_t i) {
+    return Length(mesh.positions[i] - point) + Length(mesh.normals[i] - normal);
+  };
+  for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
+    if (distance(i) < distance(nearest)) nearest = i;
+  }
+  return {mesh.uvs.at(nearest).x, 1 - mesh.uvs.at(nearest).y};
+}
+
+TEST(MitsubaReaderTest, SidesOfACubeHaveMitsubasTextureCoordinates) {
+  struct Side {
+    Vec3 normal, u, v;
+  };
+  const Scene scene = SceneOf("<shape type='cube'/>");
+  for (const Side& side : {Side{{1, 0, 0}, {0, 1, 0}, {0, 0, -1}},
+                           {{-1, 0, 0}, {0, 1, 0}, {0, 0, 1}},
+                           {{0, 1, 0}, {-1, 0, 0}, {0, 0, -1}},
+                           {{0, -1, 0}, {0, 0, 1}, {1, 0, 0}},
+                           {{0, 0, 1}, {0, 1, 0}, {1, 0, 0}},
+                           {{0, 0, -1}, {0, -1, 0}, {1, 0, 0}}}) {
+    for (const float u : {0.0F, 1.0F}) {
+      for (const float v : {0.0F, 1.0F}) {
+        const Vec3 corner = side.normal + side.u * (2 * u - 1) + side.v * (2 * v - 1);
+        const Vec2 uv = UvNear(scene.meshes.at(0), corner, side.normal);
+        EXPECT_EQ(uv.x, u);
+        EXPECT_EQ(uv.y, v);
+      }
+    }
+  }
+}
+
+TEST(MitsubaReaderTest, TexturedDisksAndCylindersHaveMitsubasTextureCoordinates) {
+  const std::string bsdf =
+      "<bsdf type='twosided'><bsdf type='diffuse'><texture "
+      "type='checkerboard' name='reflectance'/></bsdf></bsdf></shape>";
+  const Scene disk = SceneOf("<shape type='disk'>" + bsdf);
+  ASSERT_EQ(disk.meshes.size(), 1U);
+  const Vec2 at_rim = UvNear(disk.meshes[0], {0, 1, 0}, {0, 0, 1});
+  EXPECT_NEAR(at_rim.x, 1, 1e-6);
+  EXPECT_NEAR(at_rim.y, 0.25, 1e-6);
+  EXPECT_NEAR(UvNear(disk.meshes[0], {0, 0, 0}, {0, 0, 1}).x, 0, 1e-6);
+  EXPECT_GT(EdgeCross(disk.meshes[0], 0).z, 0);
+  const Scene cylinder = SceneOf("<shape type='cylinder'><point name='p1' z='4'/>" + bsdf);
+  const Vec2 on_top = UvNear(cylinder.meshes.at(0), {0, 1, 4}, {0, 1, 0});
+  EXPECT_NEAR(on_top.x, 0.25, 1e-6);
+  EXPECT_NEAR(on_top.y, 1, 1e-6);
+  EXPECT_NEAR(UvNear(cylinder.meshes.at(0), {0, 1, 0}, {0, 1, 0}).y, 0, 1e-6);
+}
+
+TEST(MitsubaReaderTest, FacesOfAnObjFileWithoutTextureCoordinatesLeaveTheOthersTheirs) {
+  const auto mesh =
+      ParseObj("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt .5 1\nf 1/1 2/1 3/1\nf 1 3 4\n");
+  ASSERT_TRUE(mesh.ok()) << mesh.status();
+  ASSERT_EQ(mesh->uvs.size(), mesh->positions.size());
+  EXPECT_EQ(mesh->uvs[mesh->indices[0]].y, 1);
+  EXPECT_EQ(mesh->uvs[mesh->indices[3]].y, 0);
+}
+
+TEST(MitsubaReaderTest, MaterialsOfAnObjFileAreTheBsdfsThatAreNamedLikeThem) {
+  const Files files = {{"two.obj",
+                        "mtllib two.mtl\nv -1 -1 0\nv 0 -1 0\nv 0 1 0\nv -1 1 0\nv 1 -1 0\n"
+                        "v 1 1 0\nusemtl matA\nf 1 2 3 4\nusemtl matB\nf 2 5 6 3\n"}};
+  const std::string body =
+      "<bsdf type='diffuse' id='r'><rgb name='reflectance' value='1 0 0'/></bsdf>"
+      "<bsdf type='diffuse' id='g'><rgb name='reflectance' value='0 1 0'/></bsdf>"
+      "<shape type='obj'><string name='filename' value='two.obj'/>";
+  const Scene scene =
+      SceneOf(body + "<ref name='matA' id='r'/><ref name='matB' id='g'/></shape>", files, "0.6.0");
+  ASSERT_EQ(scene.meshes.size(), 2U);
+  for (const TriangleMesh& mesh : scene.meshes) {
+    const Rgb color =
+        scene.materials.at(static_cast<std::size_t>(mesh.traits.material)).reflectance;
+    const bool is_left = mesh.positions.at(0).x < 0;
+    EXPECT_EQ(color.r, is_left ? 1 : 0);
+    EXPECT_EQ(color.g, is_left ? 0 : 1);
+    EXPECT_EQ(mesh.indices.size(), 6U);
+  }
+  const std::string said = "has materials of a file (mtllib), which is not read";
+  EXPECT_THAT(Said(ReadXml(Around(body + "<ref name='matA' id='r'/></shape>", "0.6.0"), files)),
+              HasSubstr(said));
+  EXPECT_THAT(Said(ReadXml(Around(body + "</shape>", "0.6.0"), files)), HasSubstr(said));
+  EXPECT_THAT(Said(ReadXml(Around(body + "</shape>"), files)), Not(HasSubstr(said)));
+}
+
 // ---- What is wrong
 
 TEST(MitsubaReaderTest, WhatIsWrongIsSaidInOneSentenceWithItsPlace) {
@@ -659,8 +1220,35 @@ TEST(MitsubaReaderTest, WhatIsWrongIsSaidInOneSentenceWithItsPlace) {
     std::string body, said;
   };
   const std::vector<Case> cases = {
-      {"<shape type='sphere'><bsdf type='phong'/></shape>",
-       "<bsdf type=\"phong\"> is not supported"},
+      {"<shape type='sphere'><bsdf type='ward'/></shape>", "<bsdf type=\"ward\"> is not supported"},
+      {"<shape type='sphere'><bsdf type='diffuse'><texture type='wood' name='reflectance'/></bsdf>"
+       "</shape>",
+       "<texture type=\"wood\"> is not supported; there are bitmap"},
+      {"<shape type='sphere'><bsdf type='diffuse'><spectrum type='wood' name='reflectance'/></bsdf>"
+       "</shape>",
+       "type=\"wood\"> is not supported; there are bitmap"},
+      {"<shape type='sphere'><bsdf type='diffuse'><spectrum name='reflectance' value='.1 .2 .3'/>"
+       "</bsdf></shape>",
+       "one number, or pairs"},
+      {"<shape type='sphere'><bsdf type='diffuse'><spectrum type='irregular' name='reflectance'>"
+       "<string name='wavelengths' value='400'/><string name='values' value='1, 1'/></spectrum>"
+       "</bsdf></shape>",
+       "as many wavelengths as values"},
+      {"<shape type='sphere'><bsdf type='coating'><bsdf type='plastic'/></bsdf></shape>",
+       "is supported over diffuse"},
+      {"<shape type='sphere'><bsdf type='mixturebsdf'><bsdf type='diffuse'/><bsdf type='diffuse'/>"
+       "</bsdf></shape>",
+       "needs <string name=\"weights\">"},
+      {"<alias id='none' as='b'/>", "no object with the id \"none\""},
+      {"<bsdf type='diffuse' id='a'/><alias id='a' as='a'/>", "the id \"a\" is given twice"},
+      {"<medium type='heterogeneous' id='m'><volume type='gridvolume' name='sigma_t'/></medium>"
+       "<shape type='cube'><bsdf type='null'/><ref name='interior' id='m'/></shape>",
+       "is not supported; there is homogeneous"},
+      {"<emitter type='point'><blackbody name='intensity' temperature='3K'/></emitter>",
+       "must have a temperature from 500"},
+      {"<shape type='sphere'><transform name='to_world'><matrix value='1 0 0 0 0 1 0 0 0 0 1 0 0 0 "
+       ".1 1'/></transform></shape>",
+       "must be affine"},
       {"<shape type='sphere'><ref id='none'/></shape>", "no object with the id \"none\""},
       {"<shape type='teapot'/>", "<shape type=\"teapot\"> is not supported; there are obj"},
       {"<shape type='sphere'><float name='radius' value='-1'/></shape>", "\"radius\" of"},
@@ -692,7 +1280,7 @@ TEST(MitsubaReaderTest, WhatIsWrongIsSaidInOneSentenceWithItsPlace) {
        "<rotate>"},
       {"<shape type='instance'/>", "needs a reference to a shapegroup"},
       {"<shape type='sphere'><bsdf type='blendbsdf'/></shape>", "needs two bsdfs"},
-      {"<shape type='sphere'><emitter type='area'><texture type='bitmap' "
+      {"<shape type='sphere'><emitter type='area'><texture type='checkerboard' "
        "name='radiance'/></emitter>"
        "</shape>",
        "is a texture, which is not supported here"},
@@ -737,6 +1325,59 @@ TEST(MitsubaReaderTest, IncludedFilesAreReadInPlace) {
                 "<scene version='3.0.0'><bsdf type='diffuse' id='red'><rgb name='reflectance' "
                 "value='#ff0000'/></bsdf></scene>"}});
   ExpectNear(scene.materials.at(1).reflectance, {1, 0, 0});
+}
+
+TEST(MitsubaReaderTest, AnIncludedFileMayBeOneObject) {
+  const Scene scene =
+      SceneOf("<shape type='sphere'><include filename='red.xml'/></shape>",
+              {{"red.xml",
+                "<bsdf type='diffuse' version='3.0.0'><include name='reflectance' "
+                "filename='color.xml'/></bsdf>"},
+               {"color.xml", "<texture type='srgb'><rgb name='color' value='1 0 0'/></texture>"}});
+  ExpectNear(scene.materials.at(1).reflectance, {1, 0, 0});
+}
+
+TEST(MitsubaReaderTest, ObjectsMayHaveASecondName) {
+  const Scene scene = SceneOf(
+      "<bsdf type='diffuse' id='a'/><alias id='a' as='b'/><shape type='sphere'><ref id='a'/>"
+      "</shape><shape type='sphere'><ref id='b'/></shape>");
+  EXPECT_EQ(scene.spheres.at(0).traits.material, scene.spheres.at(1).traits.material);
+}
+
+TEST(MitsubaReaderTest, DefaultsMayBeInObjectsAndHaveDashes) {
+  const Scene scene = SceneOf(
+      "<shape type='sphere'><default name='r-x' value='3'/><default name='r' value='2'/>"
+      "<float name='radius' value='$r-x'/></shape>"
+      "<shape type='sphere'><float name='radius' value='$r'/></shape>");
+  EXPECT_EQ(scene.spheres.at(0).radius, 3);
+  EXPECT_EQ(scene.spheres.at(1).radius, 2);
+}
+
+TEST(MitsubaReaderTest, DefaultsOfDefaultsDoNotGrowWithoutEnd) {
+  std::string body = "<default name='d0' value='0123456789'/>";
+  for (int i = 1; i < 12; ++i) {
+    const std::string before = "$d" + std::to_string(i - 1);
+    std::string value;
+    for (int repeat = 0; repeat < 10; ++repeat)
+      value += before + ".";
+    body += "<default name='d" + std::to_string(i) + "' value='" + value + "'/>";
+  }
+  const ParsedScene parsed = ReadXml(Around(body));
+  EXPECT_FALSE(parsed.ok());
+  EXPECT_THAT(Said(parsed), HasSubstr("too long with its defaults put in"));
+}
+
+TEST(MitsubaReaderTest, FilesAreLookedForInTheFoldersOfAScene) {
+  const std::string body = "<path value='./sub/'/><path value='other'/>" +
+                           Textured(
+                               "<texture type='bitmap' name='reflectance'><string "
+                               "name='filename' value='four.pfm'/></texture>");
+  for (const std::string path : {"sub/four.pfm", "other/four.pfm", "four.pfm"}) {
+    const Scene scene = SceneOf(body, {{path, kFourPixels}});
+    ExpectNear(ColorAt(scene, 0.75F, 0.25F), {0, 1, 0});
+  }
+  const ParsedScene none = ReadXml(Around(body));
+  EXPECT_THAT(Said(none), HasSubstr("four.pfm: no such file"));
 }
 
 }  // namespace

@@ -190,6 +190,27 @@ TEST(PassColorsTest, ReflectancesAndMediaHaveTheirColorsOnAverage) {
   EXPECT_EQ(working.media[1].absorption.b, 3);
 }
 
+// Factors of lobes are reflectances.
+TEST(PassColorsTest, TintsAreThoseOfASurfaceOfThatColor) {
+  Scene scene;
+  AddSphere(scene, {0, 0, 0}, 1, AddMaterial(scene, DiffuseMaterial(0.5F)));
+  scene.materials[0].reflectance = {0.9F, 0.3F, 0.1F};
+  Material glass = DielectricMaterial(1.5F);
+  glass.is_tinted = true;
+  glass.transmission_tint = scene.materials[0].reflectance;
+  AddMaterial(scene, glass);
+  AddMaterial(scene, DielectricMaterial(1.5F));
+  PassColors colors(scene);
+  for (const double place : {0.1, 0.5, 0.8}) {
+    colors.SetAt(WavelengthsAt(place), scene);
+    EXPECT_EQ(scene.materials[1].transmission_tint, scene.materials[0].reflectance);
+    EXPECT_NE(scene.materials[1].transmission_tint, (Rgb{0.9F, 0.3F, 0.1F}));
+    EXPECT_EQ(scene.materials[2].transmission_tint, Gray(1));
+  }
+  colors.SetThree(scene);
+  EXPECT_EQ(scene.materials[1].transmission_tint, (Rgb{0.9F, 0.3F, 0.1F}));
+}
+
 TEST(PassColorsTest, ThreeColorsComeBackToTheBit) {
   Scene scene;
   AddMaterial(scene, Copper());

@@ -66,12 +66,12 @@ TEST(PbrtColorSpaceTest, BelongsToTheGraphicsState) {
              0, 0, 1.1187, 2e-4);
 }
 
-TEST(PbrtColorSpaceTest, AnotherOneIsAnError) {
-  const ParsedScene parsed = ParseWorld("ColorSpace \"cmyk\"");
-  EXPECT_FALSE(parsed.ok());
-  EXPECT_THAT(parsed.diagnostics.front().ToString(),
-              HasSubstr("there is no colour space \"cmyk\"; there are srgb, rec2020, dci-p3 and "
-                        "aces2065-1"));
+TEST(PbrtColorSpaceTest, AnotherOneIsIgnoredWithAWarning) {
+  const ParsedScene parsed = ParseWorld("ColorSpace \"cmyk\" LightSource \"point\"");
+  EXPECT_TRUE(parsed.ok());
+  EXPECT_THAT(SaidOf(parsed),
+              HasSubstr("warning: there is no colour space \"cmyk\", ColorSpace is ignored; there "
+                        "are srgb, rec2020, dci-p3 and aces2065-1"));
 }
 
 TEST(PbrtOptionTest, ANameAndAValueAreRead) {
@@ -86,6 +86,11 @@ TEST(PbrtOptionTest, ANameAndAValueAreRead) {
     EXPECT_THAT(parsed.diagnostics.front().ToString(), HasSubstr("is ignored"));
   }
   EXPECT_FALSE(ParseWorld("Option \"x\"").ok());
+  // It would make another picture.
+  for (const char* const option : {"\"forcediffuse\" true", "\"bool forcediffuse\" true"})
+    EXPECT_THAT(SaidOfWorld(std::string("Option ") + option),
+                HasSubstr("warning: Option \"forcediffuse\" is ignored"));
+  EXPECT_THAT(SaidOfWorld("Option \"forcediffuse\" false"), HasSubstr("note: Option"));
 }
 
 }  // namespace

@@ -264,8 +264,32 @@ TEST(PbrtMaterialsTest, BumpsAndNormalMapsAreRead) {
   EXPECT_TRUE(needs.Uses(Part::kShadingNormals));
   EXPECT_THAT(SaidOfWorld("Material \"diffuse\" \"string normalmap\" \"none.png\""),
               HasSubstr("\"normalmap\" of Material \"diffuse\" cannot be read"));
-  EXPECT_THAT(SaidOfWorld("Material \"diffuse\" \"float displacement\" 1"),
-              HasSubstr("must be a texture"));
+  // The same everywhere is none.
+  EXPECT_EQ(ReadWorld("Material \"diffuse\" \"float displacement\" 1 Shape \"sphere\"")
+                .materials[1]
+                .displacement,
+            kNoTexture);
+}
+
+TEST(PbrtMaterialsTest, AColourAsAnIndexIsItsMean) {
+  const std::string glass = "Material \"dielectric\" \"rgb eta\" ";
+  EXPECT_FLOAT_EQ(ReadWorld(glass + "[1.25 1.5 1.75] Shape \"sphere\"").materials[1].ior, 1.5F);
+  EXPECT_THAT(SaidOfWorld(glass + "[1.25 1.5 1.75]"),
+              HasSubstr("warning: \"eta\" of Material \"dielectric\" is read as its mean, 1.5"));
+  EXPECT_THAT(SaidOfWorld(glass + "[1.5 1.5 1.5]"), Not(HasSubstr("\"eta\"")));
+  EXPECT_THAT(SaidOfWorld(glass + "[-1 -1 -1]"), HasSubstr("error: \"eta\""));
+}
+
+TEST(PbrtMaterialsTest, AParameterWithAnErrorIsNotUnknownToo) {
+  const std::string textures = "Texture \"t\" \"spectrum\" \"constant\" ";
+  for (const char* const material :
+       {"\"subsurface\" \"rgb reflectance\" [.5 .5 .5] \"texture mfp\" \"t\"",
+        "\"subsurface\" \"rgb sigma_a\" [1 1 1] \"texture sigma_s\" \"t\"",
+        "\"coateddiffuse\" \"texture albedo\" \"t\""}) {
+    const std::string said = SaidOfWorld(textures + "Material " + material);
+    EXPECT_THAT(said, HasSubstr("must not be a texture"));
+    EXPECT_THAT(said, Not(HasSubstr("unknown parameter")));
+  }
 }
 
 TEST(PbrtMaterialsTest, OpacityOfAPictureIsItsNumber) {
@@ -316,10 +340,6 @@ TEST(PbrtMaterialsTest, AlphaMayBeATextureOnAnyShape) {
                                                                       : scene.spheres[0].traits
                                               : scene.meshes[0].traits));
   }
-  EXPECT_THAT(
-      SaidOfWorld(textures + "AreaLightSource \"diffuse\" Shape \"sphere\" \"texture alpha\" "
-                             "\"half\""),
-      HasSubstr("must not be a texture on a shape that emits"));
 }
 
 // What a float texture that is declared by `text` as "t" is at a place.

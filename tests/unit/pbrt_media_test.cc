@@ -15,6 +15,7 @@ namespace {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 constexpr const char* kTriangle =
     "Shape \"trianglemesh\" \"point3 P\" [0 0 0  1 0 0  0 1 0] \"integer indices\" [0 1 2]\n";
@@ -68,6 +69,33 @@ TEST(PbrtMediaTest, InterfacesThatSeparateNoneAreDropped) {
       HasSubstr("warning: shapes of the material interface emit no light: 1"));
 }
 
+TEST(PbrtMediaTest, AnEndlessMediumHidesLightsFromInfinity) {
+  const std::string dark = "the medium \"fog\" around the scene has no end";
+  const auto said = [](const std::string& before, const std::string& world) {
+    return SaidOfPbrt(kFog + before + " Camera \"perspective\" WorldBegin " + world);
+  };
+  const std::string sky = "LightSource \"infinite\" ";
+  const std::string ball = "Shape \"sphere\" ";
+  EXPECT_THAT(said("MediumInterface \"\" \"fog\"", sky + ball), HasSubstr(dark));
+  EXPECT_THAT(said("", sky + "MediumInterface \"\" \"fog\" " + ball), HasSubstr(dark));
+  EXPECT_THAT(said("MediumInterface \"\" \"fog\"", "LightSource \"distant\" " + ball),
+              HasSubstr(dark));
+  EXPECT_THAT(said("MediumInterface \"\" \"fog\"", "LightSource \"point\" " + ball),
+              Not(HasSubstr(dark)));
+  // A room of fog.
+  EXPECT_THAT(said("MediumInterface \"\" \"fog\"", sky + "MediumInterface \"fog\" \"\" " + ball),
+              Not(HasSubstr(dark)));
+  EXPECT_THAT(said("", sky + "AttributeBegin MediumInterface \"fog\" \"\" " + ball +
+                           "AttributeEnd MediumInterface \"\" \"fog\" " + ball),
+              Not(HasSubstr(dark)));
+  // What takes no red lets it through.
+  EXPECT_THAT(SaidOfPbrt("MakeNamedMedium \"fog\" \"string type\" \"homogeneous\" \"rgb sigma_a\" "
+                         "[0 1 1] \"rgb sigma_s\" [0 0 0] MediumInterface \"fog\" Camera "
+                         "\"perspective\" WorldBegin " +
+                         sky + ball),
+              Not(HasSubstr(dark)));
+}
+
 // The unit of a scene that is a million kilometres wide is not a metre: coefficients follow.
 TEST(PbrtMediaTest, KeepTheirOpticalThicknessInAnotherUnit) {
   const Scene scene = ReadPbrt(
@@ -87,7 +115,14 @@ TEST(PbrtMediaTest, WhatIsWrongIsSaid) {
   EXPECT_THAT(
       SaidOfWorld("MakeNamedMedium \"m\" \"string type\" \"smoke\""),
       HasSubstr("\"smoke\", which is not supported; there are homogeneous, uniformgrid and cloud"));
-  EXPECT_THAT(SaidOfWorld("MediumInterface \"m\" \"\""), HasSubstr("there is no medium \"m\""));
+  EXPECT_THAT(SaidOfWorld("MediumInterface \"m\" \"\" Shape \"sphere\""),
+              HasSubstr("error: there is no medium \"m\""));
+  EXPECT_THAT(SaidOfPbrt("MediumInterface \"m\" Camera \"perspective\" WorldBegin"),
+              HasSubstr("error: there is no medium \"m\""));
+  EXPECT_THAT(SaidOfWorld("MediumInterface \"m\" LightSource \"point\""),
+              HasSubstr("error: there is no medium \"m\""));
+  EXPECT_THAT(SaidOfWorld("AttributeBegin MediumInterface \"m\" AttributeEnd Shape \"sphere\""),
+              HasSubstr("warning: there is no medium \"m\"; nothing is in it"));
   EXPECT_THAT(SaidOfWorld(std::string(kFog) + kFog), HasSubstr("is defined twice"));
   EXPECT_THAT(
       SaidOfWorld(

@@ -158,6 +158,159 @@ TEST(PbrtShapesTest, BilinearPatches) {
               HasSubstr("four for each patch"));
 }
 
+// A PLY file of a quadrangle over the unit square, whose third corner is at z = `height`.
+std::string QuadPly(double height, const std::string& columns = "", const std::string& values = "",
+                    const std::string& more_faces = "") {
+  const std::string count = more_faces.empty() ? "1" : "2";
+  return "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n"
+         "property float z\n" +
+         columns + "element face " + count +
+         "\nproperty list uchar int vertex_indices\nend_header\n" + "0 0 0 " + values + " 1 0 0 " +
+         values + " 1 1 " + std::to_string(height) + " " + values + " 0 1 0 " + values +
+         "\n4 0 1 2 3\n" + more_faces;
+}
+constexpr const char* kPly = "Shape \"plymesh\" \"string filename\" \"q.ply\"";
+
+constexpr const char* kTextured =
+    "Texture \"t\" \"spectrum\" \"bilerp\" "
+    "Material \"diffuse\" \"texture reflectance\" \"t\" ";
+
+TEST(PbrtShapesTest, QuadranglesOfFilesArePatches) {
+  const auto read = [](const std::string& ply) {
+    const ParsedScene parsed = ParseShapes(std::string(kTextured) + kPly, {{"q.ply", ply}});
+    EXPECT_TRUE(parsed.ok()) << parsed.ToStatus();
+    return parsed.scene;
+  };
+  const Scene flat = read(QuadPly(0));
+  ASSERT_EQ(flat.meshes.size(), 1U);
+  EXPECT_EQ(flat.TriangleCount(), 2U);
+  for (std::size_t i = 0; i < 4; ++i) {
+    const Vec3 p = flat.meshes[0].positions[i];
+    EXPECT_EQ(flat.meshes[0].uvs.at(i), (Vec2{p.x, p.y}));
+  }
+  EXPECT_TRUE(flat.meshes[0].normals.empty());
+  // z = x y; triangles have the area of their corners, on the surface.
+  const TriangleMesh saddle = read(QuadPly(1)).meshes.at(0);
+  EXPECT_EQ(saddle.indices.size(), std::size_t{3 * 2 * 6 * 6});
+  EXPECT_NEAR(AreaOf(saddle), 1.2808, 5e-3);
+  for (std::size_t i = 0; i < saddle.positions.size(); ++i) {
+    const Vec3 p = saddle.positions[i];
+    ASSERT_NEAR(p.z, p.x * p.y, 1e-6);
+    ASSERT_NEAR(saddle.uvs[i].x, p.x, 1e-6);
+    ASSERT_NEAR(saddle.uvs[i].y, p.y, 1e-6);
+  }
+  // Those of the file stay where it has some, and a flat quadrangle shares its corners.
+  const std::string uv = "property float u\nproperty float v\n";
+  const Scene given = read(QuadPly(0, uv, "0.25 0.5"));
+  EXPECT_EQ(given.meshes.at(0).uvs.at(2), (Vec2{0.25F, 0.5F}));
+  EXPECT_EQ(given.meshes[0].positions.size(), 4U);
+  EXPECT_EQ(read(QuadPly(1, uv, "0.25 0.5")).meshes.at(0).uvs.at(9), (Vec2{0.25F, 0.5F}));
+  const Scene smooth =
+      read(QuadPly(0, "property float nx\nproperty float ny\nproperty float nz\n", "0 0.6 0.8"));
+  EXPECT_NEAR(smooth.meshes.at(0).normals.at(3).y, 0.6F, 1e-6);
+  // Triangles beside them are a mesh of their own.
+  const Scene mixed = read(QuadPly(0, "", "", "3 0 1 2\n"));
+  ASSERT_EQ(mixed.meshes.size(), 2U);
+  EXPECT_EQ(mixed.TriangleCount(), 3U);
+}
+
+TEST(PbrtShapesTest, QuadranglesShowTheirWholeTexture) {
+  const auto said = [](const std::string& ply) {
+    return SaidOf(ParseShapes(std::string(kTextured) + kPly, {{"q.ply", ply}}));
+  };
+  EXPECT_THAT(said(QuadPly(0)), Not(HasSubstr("has no uv")));
+  EXPECT_THAT(said(QuadPly(0, "", "", "3 0 1 2\n")), HasSubstr("has no uv"));
+}
+
+// Two quadrangles with a common side: six vertices where nothing shows their places, else eight.
+TEST(PbrtShapesTest, FlatQuadranglesShareVerticesWhereNothingShowsTheirPlaces) {
+  const std::string ply =
+      "ply\nformat ascii 1.0\nelement vertex 6\nproperty float x\nproperty float y\n"
+      "property float z\nelement face 2\nproperty list uchar int vertex_indices\nend_header\n"
+      "0 0 0\n1 0 0\n2 0 0\n0 1 0\n1 1 0\n2 1 0\n4 0 1 4 3\n4 1 2 5 4\n";
+  const auto vertices = [&](const std::string& world, const std::string& after = "") {
+    const ParsedScene parsed = ParseShapes(world + kPly + after, {{"q.ply", ply}});
+    EXPECT_TRUE(parsed.ok()) << parsed.ToStatus();
+    EXPECT_EQ(parsed.scene.meshes.size(), 1U);
+    return parsed.scene.meshes.at(0).positions.size();
+  };
+  EXPECT_EQ(vertices(""), 6U);
+  EXPECT_EQ(vertices("Material \"conductor\" \"float roughness\" 0.2 "), 6U);
+  EXPECT_EQ(vertices("AreaLightSource \"diffuse\" "), 6U);
+  EXPECT_EQ(vertices(kTextured), 8U);
+  EXPECT_EQ(vertices("Material \"conductor\" \"float uroughness\" 0.2 \"float vroughness\" 0.4 "),
+            8U);
+  EXPECT_EQ(vertices("Texture \"a\" \"float\" \"bilerp\" ", " \"texture alpha\" \"a\""), 8U);
+  // What is defined later may have a texture.
+  EXPECT_EQ(
+      vertices("NamedMaterial \"m\" ", " MakeNamedMaterial \"m\" \"string type\" \"diffuse\""), 8U);
+}
+
+TEST(PbrtShapesTest, OtherFacesOfFilesAreLeftOutWithAWarning) {
+  EXPECT_THAT(
+      SaidOf(ParseShapes(kPly, {{"q.ply", QuadPly(0, "", "", "5 0 1 2 3 1\n")}})),
+      HasSubstr("warning: \"filename\" of Shape \"plymesh\" has 1 face with neither three nor"));
+}
+
+TEST(PbrtShapesTest, ManyCurvedQuadranglesAreFlatTriangles) {
+  SceneLimits limits;
+  limits.max_shape_bytes = 2048;
+  const ParsedScene parsed =
+      ParsePbrt(std::string("Camera \"perspective\" WorldBegin LightSource \"infinite\" ") + kPly,
+                {{"q.ply", QuadPly(1)}}, limits);
+  EXPECT_THAT(SaidOf(parsed), HasSubstr("each is two flat triangles"));
+  EXPECT_EQ(parsed.scene.TriangleCount(), 2U);
+}
+
+TEST(PbrtShapesTest, EdgeLengthsHaveTwoNames) {
+  const std::string uv = "property float u\nproperty float v\n";
+  const auto triangles = [&](const std::string& edge) {
+    return ParseShapes(kPly + std::string(" \"float displacement\" 0.1 \"float ") + edge + "\" 0.3",
+                       {{"q.ply", QuadPly(0, uv, "0 0")}})
+        .scene.TriangleCount();
+  };
+  EXPECT_GT(triangles("edgelength"), 2U);
+  EXPECT_EQ(triangles("displacement.edgelength"), triangles("edgelength"));
+}
+
+TEST(PbrtShapesTest, ArraysOfAWrongLengthAreLeftOutWithAWarning) {
+  const std::string mesh = "Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0] ";
+  const std::string patch = "Shape \"bilinearmesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0 1 1 0] ";
+  for (const std::string& shape : {mesh, patch}) {
+    const ParsedScene parsed =
+        ParseShapes(shape + "\"normal N\" [1 0 0 1 0 0] \"point2 uv\" [5 5] \"integer indices\" " +
+                    (shape == mesh ? "[0 1 2 0 1]" : "[0 1 2 3 0]"));
+    EXPECT_TRUE(parsed.ok()) << parsed.ToStatus();
+    const std::string said = SaidOf(parsed);
+    EXPECT_THAT(said, HasSubstr("warning: \"N\" of Shape"));
+    EXPECT_THAT(said, HasSubstr("warning: \"uv\" of Shape"));
+    EXPECT_THAT(said, HasSubstr("warning: \"indices\" of Shape"));
+    EXPECT_EQ(parsed.scene.meshes.at(0).positions.size(), shape == mesh ? 3U : 4U);
+  }
+  EXPECT_THAT(SaidOfShapes(mesh + "\"integer indices\" [0 1]"), HasSubstr("needs vertex indices"));
+}
+
+TEST(PbrtShapesTest, PowerOfAWholeIsSaidOfWhatPbrtHasPartsOf) {
+  const std::string light = "AreaLightSource \"diffuse\" \"float power\" 1 ";
+  const std::string patches = "Shape \"bilinearmesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0 1 1 0] ";
+  const std::string whole = "gets its power as a whole";
+  EXPECT_THAT(SaidOfShapes(light + patches), Not(HasSubstr(whole)));
+  EXPECT_THAT(SaidOfShapes(light + "Shape \"cylinder\""), Not(HasSubstr(whole)));
+  EXPECT_THAT(SaidOfShapes(light + patches + "\"integer indices\" [0 1 2 3 3 2 1 0]"),
+              HasSubstr(whole + "; pbrt-v4 gives it to each patch"));
+  EXPECT_THAT(SaidOfShapes(light + "Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0] "
+                                   "\"integer indices\" [0 1 2 2 1 0]"),
+              HasSubstr(whole + "; pbrt-v4 gives it to each triangle"));
+}
+
+TEST(PbrtShapesTest, CurvesOfUnknownTypesAreCylinders) {
+  const ParsedScene parsed = ParseShapes(
+      "Shape \"curve\" \"point3 P\" [0 0 0 1 0 0 2 0 0 3 0 0] \"string type\" \"tube\"");
+  EXPECT_TRUE(parsed.ok()) << parsed.ToStatus();
+  EXPECT_FALSE(parsed.scene.curve_pieces.empty());
+  EXPECT_THAT(SaidOf(parsed), HasSubstr("warning: \"type\" of Shape \"curve\" must be flat"));
+}
+
 TEST(PbrtShapesTest, SubdivisionSurfaces) {
   const std::string octahedron =
       "Shape \"loopsubdiv\" \"point3 P\" [1 0 0 -1 0 0 0 1 0 0 -1 0 0 0 1 0 0 -1] \"integer "

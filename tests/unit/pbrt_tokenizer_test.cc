@@ -39,6 +39,11 @@ TEST(PbrtTokenizerTest, SplitsWordsStringsAndBracketsWithTheirPlaces) {
   EXPECT_TRUE(read.diagnostics.empty());
 }
 
+TEST(PbrtTokenizerTest, LinesMayEndByACarriageReturnAlone) {
+  EXPECT_THAT(ReadAll("a # comment\rb\r\nc\r\rd").tokens,
+              ElementsAre("1:1 W a", "2:1 W b", "3:1 W c", "5:1 W d"));
+}
+
 TEST(PbrtTokenizerTest, ResolvesEscapesAlsoWhilePeeking) {
   const std::string file = "t.pbrt";
   Diagnostics diagnostics;

@@ -42,8 +42,7 @@ std::vector<float> Drawn(int count, KeyedRng& rng) {
 }
 
 float Looked(const AreaLight& light, Vec2 uv) {
-  return light.radiance.g *
-         PictureColor(*light.picture, uv, Texture::Wrap::kClamp, Texture::Wrap::kClamp).g;
+  return light.radiance.g * light.PixelAt(uv).g;
 }
 
 Vec2 UvIn(const std::array<Vec2, 3>& uvs, Vec2 u) {
@@ -84,15 +83,42 @@ TEST(PictureSpreadTest, OfARampIsItsIntegral) {
   EXPECT_EQ(PictureSpread::OfTriangle(light, {Vec2{-5, 0}, {-1e6F, 0}, {-7, 3}}, 64).mean().g, 0);
 }
 
+// However far off texture coordinates are, and however often a picture is repeated between them.
+TEST(PictureSpreadTest, FarPlacesAndManyCopiesAreLookedUpInstead) {
+  AreaLight light = LightOf(2, {1, 3});
+  for (const Texture::Wrap wrap : {Texture::Wrap::kRepeat, Texture::Wrap::kMirror}) {
+    light.wrap_u = light.wrap_v = wrap;
+    for (const float far : {1e9F, 1e6F, 3e38F}) {
+      const auto spread = PictureSpread::OfTriangle(light, {Vec2{-far, 0}, {far, 0}, {0, far}}, 16);
+      EXPECT_GE(spread.mean().g, 1);
+      EXPECT_LE(spread.mean().g, 3);
+    }
+  }
+  light.wrap_u = light.wrap_v = Texture::Wrap::kBlack;
+  EXPECT_EQ(PictureSpread::OfTriangle(light, {Vec2{1e9F, 0}, {2e9F, 0}, {1e9F, 1e9F}}, 16).mean().g,
+            0);
+}
+
 TEST(PictureSpreadTest, AgreesWithLookingUp) {
   KeyedRng rng(2);
   for (int trial = 0; trial < 30; ++trial) {
     const int width = 1 + static_cast<int>(rng.Uniform() * 12);
     const int height = 1 + static_cast<int>(rng.Uniform() * 12);
-    const AreaLight light = LightOf(width, Drawn(width * height, rng));
+    AreaLight light = LightOf(width, Drawn(width * height, rng));
     std::array<Vec2, 3> uvs;
     for (Vec2& uv : uvs)
       uv = {2 * rng.Uniform() - 0.5F, 2 * rng.Uniform() - 0.5F};
+    // Copies beyond the edges, turned and moved.
+    using enum Texture::Wrap;
+    constexpr std::array kWraps = {kClamp, kClamp, kRepeat, kMirror, kBlack};
+    light.wrap_u = kWraps[static_cast<std::size_t>(trial) % kWraps.size()];
+    light.wrap_v = kWraps[static_cast<std::size_t>(trial / 2) % kWraps.size()];
+    if (trial % 4 == 3) {
+      light.mapping.kind = TextureMapping::Kind::kUvAffine;
+      light.mapping.axis_u = {0.8F, 1.1F, 0};
+      light.mapping.axis_v = {-0.7F, 0.9F, 0};
+      light.mapping.delta_u = 0.3F;
+    }
     // A third of them is a line of the picture, or a point.
     if (trial % 3 == 0) uvs[2] = uvs[trial % 2 == 0 ? 1 : 0];
     const auto spread = PictureSpread::OfTriangle(light, uvs, 16);

@@ -88,6 +88,20 @@ TEST(PlyFileTest, ReadsOneMeshFromEveryFormat) {
   ExpectSquare(Gzip(BinarySquare(true)));
 }
 
+TEST(PlyFileTest, SkipsFacesThatAreNoTrianglesOrQuadrangles) {
+  PlyFaces faces;
+  const StatusOr<TriangleMesh> mesh = ParsePly(
+      "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n"
+      "property float z\nelement face 6\nproperty list uchar int vertex_index\nproperty int id\n"
+      "end_header\n0 0 0 1 0 0 1 1 0 0 1 0\n"
+      "0 7\n2 0 1 7\n3 0 1 2 7\n5 0 1 2 3 99 7\n4 0 1 2 3 7\n3 1 1 2 7\n",
+      &faces);
+  ASSERT_TRUE(mesh.ok()) << mesh.status();
+  EXPECT_THAT(mesh->indices, ElementsAre(0, 1, 2, 0, 1, 2, 0, 2, 3, 1, 1, 2));
+  EXPECT_THAT(faces.quads, ElementsAre(1));
+  EXPECT_EQ(faces.skipped, 3U);
+}
+
 TEST(PlyFileTest, ReadsTextureCoordinatesByEitherName) {
   const auto uvs = [](const std::string& names) {
     return ParsePly("ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\n" + names +
@@ -134,8 +148,10 @@ TEST(PlyFileTest, RefusesIndicesPositionsAndFacesThatAreNotSound) {
               HasSubstr("position of vertex 1 is not finite"));
   EXPECT_THAT(Why(with_body("0 0 0 1 1e39 0 0 1 0 3 0 1 2\n")),
               HasSubstr("position of vertex 1 is not finite"));
-  EXPECT_THAT(Why(with_body("0 0 0 1 0 0 0 1 0 2 0 1\n")), HasSubstr("face 0 has 2 corners"));
-  EXPECT_THAT(Why(with_body("0 0 0 1 0 0 0 1 0 5 0 1 2 0 1\n")), HasSubstr("has 5 corners"));
+  EXPECT_THAT(Why(with_body("0 0 0 1 0 0 0 1 0 -3 0 1 2\n")), HasSubstr("has -3 corners"));
+  EXPECT_THAT(Why(with_body("0 0 0 1 0 0 0 1 0 3.5 0 1 2\n")), HasSubstr("has 3.5 corners"));
+  EXPECT_THAT(Why(with_body("0 0 0 1 0 0 0 1 0 5 0 1 2 0\n")), HasSubstr("it ends within face 0"));
+  EXPECT_THAT(Why(with_body("0 0 0 1 0 0 0 1 0 1e300 0 1 2 0\n")), HasSubstr("it ends within"));
   EXPECT_THAT(Why(with_body("0 0 0 1 zero 0 0 1 0 3 0 1 2\n")),
               HasSubstr("there is no number in vertex 1"));
 }

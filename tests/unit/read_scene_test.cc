@@ -39,11 +39,11 @@ TEST(ReadSceneTest, WithoutAKnownNameTheFirstWordDoes) {
 
 TEST(ReadSceneTest, AFileOfNoKnownFormatIsRefused) {
   for (const std::string bytes :
-       {"{\"scene\": 0}", "<room version=\"3.0.0\"/>", "", "# only a comment", "\"Camera\""}) {
+       {"{\"room\": 0}", "<room version=\"3.0.0\"/>", "", "# only a comment", "\"Camera\""}) {
     EXPECT_EQ(ReadNamed("scene.txt", bytes).ToStatus().message(),
               "scene.txt: error: this is no scene in a format that is read here; there are "
-              "pbrt-v4 (.pbrt), glTF 2.0 (.gltf), binary glTF 2.0 (.glb), Mitsuba (.xml) and "
-              "points to measure irradiance at (.ply)")
+              "pbrt-v4 (.pbrt), glTF 2.0 (.gltf), binary glTF 2.0 (.glb), Mitsuba (.xml), "
+              "a view of a scene (.view.json) and points to measure irradiance at (.ply)")
         << bytes;
   }
 }

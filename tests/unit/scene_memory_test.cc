@@ -159,6 +159,22 @@ TEST(SceneMemoryTest, APictureCountsOnceHoweverManyTexturesShowIt) {
   EXPECT_EQ(SceneMemoryOf(scene, kRays).textures, (3 << 20) + sizeof(Picture));
 }
 
+// The picture, and the distribution of places on each of its triangles.
+TEST(SceneMemoryTest, CountsPicturesOfLights) {
+  Scene scene;
+  const std::int32_t white = AddMaterial(scene, DiffuseMaterial(0.5F));
+  AddQuad(scene, {-1, -1, 0}, {2, 0, 0}, {0, 2, 0}, white, AddAreaLight(scene, 1));
+  const SceneMemory even = SceneMemoryOf(scene, kRays);
+  Picture picture;
+  picture.width = picture.height = 100;
+  picture.linear.resize(3 * 100 * 100);
+  scene.area_lights[0].picture = std::make_shared<const Picture>(std::move(picture));
+  const SceneMemory shown = SceneMemoryOf(scene, kRays);
+  EXPECT_GE(shown.textures - even.textures, 3 * 100 * 100 * sizeof(float));
+  // 256 x 256 cells of four bytes.
+  EXPECT_NEAR(shown.lights - even.lights, 2 * 4 * 256 * 256, 2 * 1024);
+}
+
 TEST(SceneMemoryTest, AMeasuredSurfaceCountsOnceHoweverManyMaterialsHaveIt) {
   Scene scene = With(Grid(1));
   const Material material = MeasuredMaterial(MeasureMetal({}));

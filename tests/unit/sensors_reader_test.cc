@@ -117,7 +117,7 @@ TEST(SensorsReaderTest, SaysWhatIsMissing) {
               HasSubstr(".."));
   EXPECT_THAT(
       ErrorOf(File("comment lucerna scene points.ply\ncomment lucerna spacing 1\n", row, 1)),
-      HasSubstr("must not be a PLY file"));
+      HasSubstr("name one in another format"));
   EXPECT_THAT(ErrorOf(File(kComments, "", 0)), HasSubstr("no points"));
   EXPECT_THAT(ErrorOf(File(kComments, "0 0 1 0 0 0\n", 1)), HasSubstr("normal of point 0"));
   EXPECT_THAT(ErrorOf(File(kComments, "0 0 1 0 0 3\n", 1)), HasSubstr("normal of point 0"));

@@ -85,6 +85,41 @@ TEST(TextureTest, MirroredCopiesMeetWithEqualPixels) {
               TextureColor(std::vector<Texture>{PictureTexture()}, 0, {{0.75F, 0.75F}, {}, {}}));
 }
 
+TEST(TextureTest, TheNearestPixelIsNotInterpolated) {
+  Picture picture;
+  picture.width = 2;
+  picture.height = 1;
+  picture.linear = {1, 0, 0, 0, 1, 0};
+  Texture texture;
+  texture.kind = Texture::Kind::kPicture;
+  texture.is_nearest = true;
+  texture.picture = std::make_shared<const Picture>(picture);
+  const auto at = [&](float u) {
+    return TextureColor(std::vector<Texture>{texture}, 0, {{u, 0.4F}, {}, {}});
+  };
+  EXPECT_EQ(at(0.01F), (Rgb{1, 0, 0}));
+  EXPECT_EQ(at(0.49F), (Rgb{1, 0, 0}));
+  EXPECT_EQ(at(0.51F), (Rgb{0, 1, 0}));
+  EXPECT_EQ(at(1.25F), (Rgb{1, 0, 0}));
+  texture.wrap_u = Texture::Wrap::kMirror;
+  EXPECT_EQ(at(1.25F), (Rgb{0, 1, 0}));
+  texture.wrap_u = Texture::Wrap::kClamp;
+  EXPECT_EQ(at(-3), (Rgb{1, 0, 0}));
+  texture.wrap_u = Texture::Wrap::kBlack;
+  EXPECT_EQ(at(-0.1F), Rgb());
+}
+
+TEST(TextureTest, ColoursOfVerticesMultiply) {
+  Texture constant;
+  constant.color = {0.5F, 0.5F, 1};
+  Texture colors;
+  colors.kind = Texture::Kind::kVertexColor;
+  colors.parts[0] = 0;
+  const std::vector<Texture> textures = {constant, colors};
+  EXPECT_EQ(TextureColor(textures, 1, {{}, {}, {}, {1, 0.5F, 0.25F}}), (Rgb{0.5F, 0.25F, 0.25F}));
+  EXPECT_EQ(TextureColor(textures, 1, {}), constant.color);
+}
+
 TEST(TextureTest, MappingScaleAndInversionAreApplied) {
   Texture texture = PictureTexture();
   texture.mapping = ByUv(2, 4, 0.5F, 0.25F);

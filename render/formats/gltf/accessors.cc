@@ -1,6 +1,7 @@
 #include "render/formats/gltf/accessors.h"
 
 #include <algorithm>
+#include <cctype>
 #include <cstring>
 
 #include "render/base/text.h"
@@ -16,9 +17,9 @@ constexpr int kUnsignedShort = 5123;
 constexpr int kUnsignedInt = 5125;
 constexpr int kFloat = 5126;
 
-// An accessor of zeros with sparse replacements may have so many elements for each of these: what
-// a packed file may unpack to.
-constexpr std::uint64_t kMaxElementsPerSparse = 200;
+// Of an accessor without a view, whose zeros stand in no file. What is made of them is counted like
+// anything else (GltfBudget).
+constexpr std::uint64_t kMaxZeroBytes = std::uint64_t{64} << 20;
 
 std::size_t BytesOfComponent(int type) {
   switch (type) {
@@ -74,9 +75,11 @@ UseRule RuleOf(GltfUse use) {
     case GltfUse::kVec3:
       return {"VEC3", 3, "must be of type VEC3 here"};
     case GltfUse::kVec4:
+      return {"VEC4", 4, "must be of type VEC4 here"};
+    case GltfUse::kMat4:
       break;
   }
-  return {"VEC4", 4, "must be of type VEC4 here"};
+  return {"MAT4", 16, "must be of type MAT4 here"};
 }
 
 int Base64Value(char c) {
@@ -88,14 +91,22 @@ int Base64Value(char c) {
   return -1;
 }
 
+bool IsSpace(char c) {
+  return std::isspace(static_cast<unsigned char>(c)) != 0;
+}
+
+// Some writers break the lines.
 StatusOr<std::string> FromBase64(std::string_view text) {
-  for (int padding = 0; padding < 2 && text.ends_with('='); ++padding)
+  for (int padding = 0; !text.empty();) {
+    if (text.back() == '=' ? ++padding > 2 : !IsSpace(text.back())) break;
     text.remove_suffix(1);
+  }
   std::string bytes;
   bytes.reserve(text.size() / 4 * 3 + 2);
   std::uint32_t bits = 0;
   int bit_count = 0;
   for (const char c : text) {
+    if (IsSpace(c)) continue;
     const int value = Base64Value(c);
     if (value < 0) return absl::InvalidArgumentError("a data: URI is damaged: it is no base64");
     bits = (bits << 6U | static_cast<std::uint32_t>(value)) & 0xFFFFFFU;
@@ -108,8 +119,14 @@ StatusOr<std::string> FromBase64(std::string_view text) {
   return bytes;
 }
 
-// With %20 and the like as the bytes they stand for.
-StatusOr<std::string> PathOfUri(std::string_view uri) {
+bool EqualButForCase(std::string_view a, std::string_view lower_case) {
+  return std::ranges::equal(a, lower_case, [](char x, char y) {
+    return std::tolower(static_cast<unsigned char>(x)) == y;
+  });
+}
+
+// With %20 and the like as the bytes they stand for; a '%' that begins none stands for itself.
+std::string Unescaped(std::string_view uri) {
   const auto digit = [](char c) {
     if (c >= '0' && c <= '9') return c - '0';
     if (c >= 'A' && c <= 'F') return c - 'A' + 10;
@@ -118,18 +135,42 @@ StatusOr<std::string> PathOfUri(std::string_view uri) {
   };
   std::string path;
   for (std::size_t i = 0; i < uri.size(); ++i) {
-    if (uri[i] != '%') {
+    const bool has_digits = uri[i] == '%' && i + 2 < uri.size();
+    const int high = has_digits ? digit(uri[i + 1]) : -1;
+    const int low = has_digits ? digit(uri[i + 2]) : -1;
+    if (high < 0 || low < 0) {
       path += uri[i];
       continue;
     }
-    const int high = i + 2 < uri.size() ? digit(uri[i + 1]) : -1;
-    const int low = i + 2 < uri.size() ? digit(uri[i + 2]) : -1;
-    if (high < 0 || low < 0)
-      return absl::InvalidArgumentError(Concat("the URI ", Quoted(uri), " is damaged"));
     path += static_cast<char>(high * 16 + low);
     i += 2;
   }
   return path;
+}
+
+// The path that a URI without a scheme names. "a/../b" is b; what leads out of the folder is left
+// as it is, for who reads files to judge.
+std::string PathOfUri(std::string_view uri) {
+  std::string path = Unescaped(uri);
+  std::ranges::replace(path, '\\', '/');
+  std::vector<std::string_view> components;
+  for (std::size_t start = 0; start <= path.size();) {
+    const std::string_view component =
+        std::string_view(path).substr(start, path.find('/', start) - start);
+    start += component.size() + 1;
+    if (component == ".") continue;
+    if (component != "..") {
+      components.push_back(component);
+    } else if (components.empty() || components.back().empty()) {
+      return path;
+    } else {
+      components.pop_back();
+    }
+  }
+  std::string normal;
+  for (std::size_t i = 0; i < components.size(); ++i)
+    normal += Concat(i == 0 ? "" : "/", components[i]);
+  return normal;
 }
 
 }  // namespace
@@ -137,9 +178,11 @@ StatusOr<std::string> PathOfUri(std::string_view uri) {
 StatusOr<std::string> ReadGltfUri(std::string_view uri, AssetReader& assets) {
   constexpr std::string_view kData = "data:";
   constexpr std::string_view kBase64 = ";base64";
-  if (uri.starts_with(kData)) {
+  if (EqualButForCase(uri.substr(0, kData.size()), kData)) {
     const std::size_t comma = uri.find(',');
-    if (comma == std::string_view::npos || !uri.substr(0, comma).ends_with(kBase64)) {
+    const std::string_view type = uri.substr(0, comma == std::string_view::npos ? 0 : comma);
+    if (type.size() < kBase64.size() ||
+        !EqualButForCase(type.substr(type.size() - kBase64.size()), kBase64)) {
       return absl::InvalidArgumentError("a data: URI is not in base64, which is not supported");
     }
     return FromBase64(uri.substr(comma + 1));
@@ -150,8 +193,12 @@ StatusOr<std::string> ReadGltfUri(std::string_view uri, AssetReader& assets) {
     return absl::InvalidArgumentError(
         Concat("the URI ", Quoted(uri), " is no file beside the scene, and nothing is fetched"));
   }
-  LUCERNA_ASSIGN_OR_RETURN(const std::string path, PathOfUri(uri));
-  return assets.ReadBytes(path);
+  StatusOr<std::string> bytes = assets.ReadBytes(PathOfUri(uri));
+  // A file's name may hold what begins a query or a fragment, so that is cut off second.
+  const std::size_t name_end = uri.find_first_of("?#");
+  if (bytes.status().code() != absl::StatusCode::kNotFound || name_end == std::string_view::npos)
+    return bytes;
+  return assets.ReadBytes(PathOfUri(uri.substr(0, name_end)));
 }
 
 // ---- GltfAccessor
@@ -188,14 +235,17 @@ double GltfAccessor::NumberAt(const char* at) const {
   }
 }
 
-std::array<double, 4> GltfAccessor::At(std::size_t index) const {
-  std::array<double, 4> numbers{};
+template <std::size_t kCount>
+std::array<double, kCount> GltfAccessor::NumbersAt(std::size_t index) const {
+  std::array<double, kCount> numbers{};
   const char* element = ElementAt(index);
   if (element == nullptr) return numbers;
-  for (std::size_t i = 0; i < components_; ++i)
+  for (std::size_t i = 0; i < std::min(components_, kCount); ++i)
     numbers[i] = NumberAt(element + i * component_bytes_);
   return numbers;
 }
+template std::array<double, 4> GltfAccessor::NumbersAt(std::size_t index) const;
+template std::array<double, 16> GltfAccessor::NumbersAt(std::size_t index) const;
 
 std::uint32_t GltfAccessor::WholeAt(std::size_t index) const {
   const char* element = ElementAt(index);
@@ -208,7 +258,7 @@ std::optional<std::string_view> GltfBuffers::BytesOf(std::size_t index) {
   Buffer& buffer = buffers_[index];
   if (buffer.is_read) return buffer.bytes;
   buffer.is_read = true;
-  const GltfObject object = document_.At("buffers", index);
+  const JsonObject object = document_.At("buffers", index);
   const std::optional<std::uint64_t> size = object.Whole("byteLength");
   if (!size.has_value()) {
     if (!object.Has("byteLength")) object.Error("needs byteLength");
@@ -238,7 +288,7 @@ std::optional<std::string_view> GltfBuffers::BytesOf(std::size_t index) {
 }
 
 std::optional<std::string_view> GltfBuffers::View(std::size_t index) {
-  const GltfObject view = document_.At("bufferViews", index);
+  const JsonObject view = document_.At("bufferViews", index);
   const std::optional<std::size_t> buffer = view.Index("buffer", "buffers");
   const std::optional<std::uint64_t> size = view.Whole("byteLength");
   const std::uint64_t offset = view.Whole("byteOffset").value_or(0);
@@ -256,7 +306,7 @@ std::optional<std::string_view> GltfBuffers::View(std::size_t index) {
   return bytes->substr(offset, *size);
 }
 
-const char* GltfBuffers::Elements(const GltfObject& object, std::size_t view, std::uint64_t offset,
+const char* GltfBuffers::Elements(const JsonObject& object, std::size_t view, std::uint64_t offset,
                                   std::uint64_t count, std::uint64_t element_bytes,
                                   std::uint64_t stride) {
   const std::optional<std::string_view> bytes = View(view);
@@ -272,16 +322,16 @@ const char* GltfBuffers::Elements(const GltfObject& object, std::size_t view, st
   return bytes->data() + offset;
 }
 
-bool GltfBuffers::ReadSparse(const GltfObject& object, GltfAccessor& accessor) {
-  const GltfObject sparse = object.Child("sparse");
+bool GltfBuffers::ReadSparse(const JsonObject& object, GltfAccessor& accessor) {
+  const JsonObject sparse = object.Child("sparse");
   if (!sparse.exists()) return !object.Has("sparse");
   const std::uint64_t count = sparse.Whole("count").value_or(0);
   if (count == 0 || count > accessor.count_) {
     sparse.Error(Concat("count must be from 1 to the accessor's ", accessor.count_));
     return false;
   }
-  const GltfObject indices = sparse.Child("indices");
-  const GltfObject values = sparse.Child("values");
+  const JsonObject indices = sparse.Child("indices");
+  const JsonObject values = sparse.Child("values");
   const std::optional<std::size_t> index_view = indices.Index("bufferView", "bufferViews");
   const std::optional<std::size_t> value_view = values.Index("bufferView", "bufferViews");
   const auto type = static_cast<int>(
@@ -319,7 +369,7 @@ const GltfAccessor* GltfBuffers::Open(std::size_t index, GltfUse use) {
 }
 
 std::optional<GltfAccessor> GltfBuffers::Read(std::size_t index, GltfUse use) {
-  const GltfObject object = document_.At("accessors", index);
+  const JsonObject object = document_.At("accessors", index);
   const UseRule rule = RuleOf(use);
   GltfAccessor accessor;
   accessor.component_type_ = static_cast<int>(
@@ -348,7 +398,7 @@ std::optional<GltfAccessor> GltfBuffers::Read(std::size_t index, GltfUse use) {
   if (object.Has("bufferView")) {
     const std::optional<std::size_t> view = object.Index("bufferView", "bufferViews");
     if (!view.has_value()) return std::nullopt;
-    const GltfObject of_view = document_.At("bufferViews", *view);
+    const JsonObject of_view = document_.At("bufferViews", *view);
     const std::uint64_t stride = of_view.Whole("byteStride").value_or(element_bytes);
     constexpr std::uint64_t kMaxStride = 252;
     if (stride < element_bytes || (of_view.Has("byteStride") && stride > kMaxStride)) {
@@ -361,14 +411,12 @@ std::optional<GltfAccessor> GltfBuffers::Read(std::size_t index, GltfUse use) {
                               accessor.count_, element_bytes, stride);
     if (accessor.data_ == nullptr) return std::nullopt;
   }
-  if (!ReadSparse(object, accessor)) return std::nullopt;
-  if (accessor.data_ == nullptr &&
-      accessor.count_ / kMaxElementsPerSparse > accessor.sparse_indices_.size()) {
-    object.Error(accessor.sparse_indices_.empty()
-                     ? "has neither a bufferView nor sparse values"
-                     : "has more than 200 elements for each of its sparse values, and no others");
+  if (accessor.data_ == nullptr && accessor.count_ > kMaxZeroBytes / element_bytes) {
+    object.Error(Concat("has no bufferView, so it is zeros, of which it may have ", kMaxZeroBytes,
+                        " bytes; it has ", accessor.count_, " elements of ", element_bytes));
     return std::nullopt;
   }
+  if (!ReadSparse(object, accessor)) return std::nullopt;
   return accessor;
 }
 

@@ -2,7 +2,7 @@
 //
 // An accessor is checked as a whole when it is opened: its type, stride, count and sparse
 // replacements lie within the bytes that there are, so reading an element needs no checks and takes
-// no memory. Nothing is sized by a count that no bytes stand behind.
+// no memory. An accessor without bytes is zeros, of which there may be 64 MiB.
 #pragma once
 
 #include <array>
@@ -20,20 +20,26 @@
 
 namespace lucerna {
 
-// Elements of one to four numbers. Points into the buffers.
+// Elements of one to four numbers, or of 4 x 4 matrices. Points into the buffers.
 class GltfAccessor {
  public:
   [[nodiscard]] std::size_t count() const { return count_; }
   // Of integers that stand for the interval [0, 1] or [-1, 1].
   [[nodiscard]] bool is_normalized() const { return is_normalized_; }
   // Requires index < count(). The components of an element; those it does not have are 0.
-  [[nodiscard]] std::array<double, 4> At(std::size_t index) const;
+  [[nodiscard]] std::array<double, 4> At(std::size_t index) const { return NumbersAt<4>(index); }
+  // Of a matrix, column by column.
+  [[nodiscard]] std::array<double, 16> MatrixAt(std::size_t index) const {
+    return NumbersAt<16>(index);
+  }
   // Of a scalar of unsigned integers.
   [[nodiscard]] std::uint32_t WholeAt(std::size_t index) const;
 
  private:
   friend class GltfBuffers;
 
+  template <std::size_t kCount>
+  [[nodiscard]] std::array<double, kCount> NumbersAt(std::size_t index) const;
   [[nodiscard]] const char* ElementAt(std::size_t index) const;
   [[nodiscard]] double NumberAt(const char* at) const;
 
@@ -50,7 +56,7 @@ class GltfAccessor {
 };
 
 // What an accessor has to be for its use.
-enum class GltfUse : std::uint8_t { kIndices, kScalar, kVec2, kVec3, kVec4 };
+enum class GltfUse : std::uint8_t { kIndices, kScalar, kVec2, kVec3, kVec4, kMat4 };
 
 class GltfBuffers {
  public:
@@ -72,9 +78,9 @@ class GltfBuffers {
 
   [[nodiscard]] std::optional<std::string_view> BytesOf(std::size_t buffer);
   [[nodiscard]] std::optional<GltfAccessor> Read(std::size_t accessor, GltfUse use);
-  [[nodiscard]] bool ReadSparse(const GltfObject& object, GltfAccessor& accessor);
+  [[nodiscard]] bool ReadSparse(const JsonObject& object, GltfAccessor& accessor);
   // `count` elements of `element_bytes` each, `stride` apart, from `offset` in a view.
-  [[nodiscard]] const char* Elements(const GltfObject& object, std::size_t view,
+  [[nodiscard]] const char* Elements(const JsonObject& object, std::size_t view,
                                      std::uint64_t offset, std::uint64_t count,
                                      std::uint64_t element_bytes, std::uint64_t stride);
 
@@ -84,7 +90,8 @@ class GltfBuffers {
   std::map<std::pair<std::size_t, GltfUse>, std::optional<GltfAccessor>> opened_;
 };
 
-// What a "uri" of the document names: bytes within the text (data:), or a file beside it.
+// What a "uri" of the document names: bytes within the text (data:), or a file beside it, by a path
+// that is read the way most other programs read it.
 // Errors: INVALID_ARGUMENT for other schemes and damaged text, and those of the reader.
 [[nodiscard]] StatusOr<std::string> ReadGltfUri(std::string_view uri, AssetReader& assets);
 

@@ -7,7 +7,6 @@
 #include <optional>
 
 #include "render/base/text.h"
-#include "render/scene/scene_extent.h"
 
 namespace lucerna {
 namespace {
@@ -41,8 +40,8 @@ std::optional<Transform> CameraToWorld(const Transform& node_to_world) {
   return to_world;
 }
 
-void ReadPerspective(const GltfObject& camera, Scene& scene) {
-  const GltfObject lens = camera.Child("perspective");
+void ReadPerspective(const JsonObject& camera, Scene& scene) {
+  const JsonObject lens = camera.Child("perspective");
   if (!lens.Has("yfov")) camera.Error("needs perspective.yfov");
   const double height_rad = lens.Number("yfov", 1, {1e-4, 3.14});
   if (lens.Has("aspectRatio"))
@@ -54,11 +53,23 @@ void ReadPerspective(const GltfObject& camera, Scene& scene) {
   scene.camera.fov_deg = std::clamp(Degrees(shorter_rad), 0.001, 179.999);
 }
 
-void ReadOrthographic(const GltfObject& camera, Scene& scene) {
-  const GltfObject lens = camera.Child("orthographic");
+// xmag or ymag. Of a negative one the sign, which would mirror the image, is not meant.
+double HalfSize(const JsonObject& lens, const char* name) {
+  constexpr double kLeast = 1e-12;
+  const double size = lens.Number(name, 1, {-1e12, 1e12});
+  if (std::abs(size) < kLeast) {
+    lens.Error(Concat(name, " is ", size, ", which leaves nothing to see"));
+    return 1;
+  }
+  if (size < 0) lens.Warning(Concat(name, " is ", size, ", and is read as ", -size));
+  return std::abs(size);
+}
+
+void ReadOrthographic(const JsonObject& camera, Scene& scene) {
+  const JsonObject lens = camera.Child("orthographic");
   if (!lens.Has("xmag") || !lens.Has("ymag")) camera.Error("needs orthographic.xmag and ymag");
-  const double half_width = lens.Number("xmag", 1, {1e-12, 1e12});
-  const double half_height = lens.Number("ymag", 1, {1e-12, 1e12});
+  const double half_width = HalfSize(lens, "xmag");
+  const double half_height = HalfSize(lens, "ymag");
   SetFilm(scene.film, std::clamp(half_width / half_height, 1 / kLargestAspect, kLargestAspect));
   scene.camera.kind = Camera::Kind::kOrthographic;
   scene.camera.window_scale = std::min(half_width, half_height);
@@ -69,7 +80,7 @@ void ReadOrthographic(const GltfObject& camera, Scene& scene) {
 void SetGltfCamera(const GltfDocument& document, const std::vector<GltfPlace>& places,
                    Scene& scene) {
   const GltfPlace& place = places.front();
-  const GltfObject camera = document.At("cameras", place.index);
+  const JsonObject camera = document.At("cameras", place.index);
   if (places.size() > 1) {
     document.diagnostics().Note(document.whole(),
                                 Concat("the scene has ", places.size(), " cameras; the first, ",
@@ -89,29 +100,6 @@ void SetGltfCamera(const GltfDocument& document, const std::vector<GltfPlace>& p
   } else {
     camera.Error("is flattened by the transform of its node");
   }
-}
-
-void FrameWholeScene(Scene& scene) {
-  constexpr double kFovDeg = 40;
-  constexpr double kMargin = 1.05;
-  // +z is the front of a glTF model, +y is up.
-  constexpr std::array kFrom = {0.4, 0.3, 1.0};
-  const Bounds box = BoundsOf(scene);
-  const Vec3 center = box.Center();
-  const double diagonal = static_cast<double>(box.Diagonal());
-  const double radius = diagonal > 0 ? diagonal / 2 : 1;
-  const double distance = kMargin * radius / std::sin(kFovDeg / 2 * std::numbers::pi / 180) /
-                          std::hypot(kFrom[0], kFrom[1], kFrom[2]);
-  const std::array<double, 3> look = {static_cast<double>(center.x), static_cast<double>(center.y),
-                                      static_cast<double>(center.z)};
-  const std::array<double, 3> eye = {look[0] + distance * kFrom[0], look[1] + distance * kFrom[1],
-                                     look[2] + distance * kFrom[2]};
-  const StatusOr<Transform> to_camera = Transform::LookAt(eye, look, {0, 1, 0});
-  scene.camera.fov_deg = kFovDeg;
-  if (!to_camera.ok()) return;
-  // LookAt makes the left-handed camera of pbrt, whose image of a right-handed scene is mirrored.
-  const StatusOr<Transform> to_world = to_camera->Inverse();
-  if (to_world.ok()) scene.camera.camera_to_world = *to_world * Transform::Scale(-1, 1, 1);
 }
 
 }  // namespace lucerna

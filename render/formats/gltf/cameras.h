@@ -1,4 +1,4 @@
-// The camera of a glTF document, or a view of the whole scene where there is none.
+// The camera of a glTF document.
 #pragma once
 
 #include <vector>
@@ -13,9 +13,5 @@ namespace lucerna {
 // are in the diagnostics.
 void SetGltfCamera(const GltfDocument& document, const std::vector<GltfPlace>& places,
                    Scene& scene);
-
-// A camera that sees all shapes of the scene, from the front and a little from above. Requires that
-// there are some.
-void FrameWholeScene(Scene& scene);
 
 }  // namespace lucerna

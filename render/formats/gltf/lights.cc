@@ -14,6 +14,9 @@ namespace {
 // takes it back. `rgb 1 1 1` has luminance 1 in a Scene, so no other factor is left.
 constexpr double kLumensPerWatt = 683;
 
+// Of the outer cone of a spot: between them the light falls.
+constexpr double kWidestInner = 0.999;
+
 // Lights look along -z of their node; its scale has no effect.
 std::optional<Vec3> DirectionOf(const Transform& to_world) {
   const auto& m = to_world.rows();
@@ -27,13 +30,17 @@ Vec3 PositionOf(const Transform& to_world) {
   return to_world.Point({0, 0, 0});
 }
 
-void SetCone(const GltfObject& light, SpotLight& spot) {
+void SetCone(const JsonObject& light, SpotLight& spot) {
   constexpr double kPi2 = std::numbers::pi / 2;
-  const GltfObject cone = light.Child("spot");
+  const JsonObject cone = light.Child("spot");
   // Written out with few digits, a right angle may be a little more.
   const double outer_rad = cone.Held("outerConeAngle", std::numbers::pi / 4, {1e-6, kPi2});
-  const double inner_rad = cone.Held("innerConeAngle", 0, {0, kPi2});
-  if (inner_rad > outer_rad) cone.Error("innerConeAngle is larger than outerConeAngle");
+  double inner_rad = cone.Held("innerConeAngle", 0, {0, kPi2});
+  if (inner_rad >= outer_rad) {
+    cone.Warning(Concat("innerConeAngle is ", inner_rad, ", not below outerConeAngle (", outer_rad,
+                        "), and is held there"));
+    inner_rad = kWidestInner * outer_rad;
+  }
   spot.cos_total_width = static_cast<float>(std::cos(outer_rad));
   spot.cos_falloff_start = static_cast<float>(std::cos(inner_rad));
 }
@@ -43,8 +50,8 @@ void SetCone(const GltfObject& light, SpotLight& spot) {
 void AddGltfLights(const GltfDocument& document, const std::vector<GltfPlace>& places,
                    Scene& scene) {
   if (places.empty()) return;
-  const std::vector<GltfObject> lights =
-      document.Root().Extension("KHR_lights_punctual").Children("lights");
+  const std::vector<JsonObject> lights =
+      ExtensionOf(document.Root(), "KHR_lights_punctual").Children("lights");
   for (const GltfPlace& place : places) {
     if (place.index >= lights.size()) {
       document.diagnostics().Error(
@@ -52,8 +59,8 @@ void AddGltfLights(const GltfDocument& document, const std::vector<GltfPlace>& p
                                    lights.size(), " (KHR_lights_punctual)"));
       continue;
     }
-    const GltfObject& light = lights[place.index];
-    const std::vector<double> color = light.HeldNumbers("color", {1, 1, 1}, kGltfFactor);
+    const JsonObject& light = lights[place.index];
+    const std::vector<double> color = light.HeldNumbers("color", {1, 1, 1}, kJsonFactor);
     const double strength = light.Number("intensity", 1, {0, 1e20}) / kLumensPerWatt;
     const Rgb emitted = {static_cast<float>(color[0] * strength),
                          static_cast<float>(color[1] * strength),
@@ -71,7 +78,10 @@ void AddGltfLights(const GltfDocument& document, const std::vector<GltfPlace>& p
     } else if (type != "spot" && type != "directional") {
       light.Error(Concat("type is ", Quoted(type), ", not point, spot or directional"));
     } else if (!direction.has_value()) {
-      light.Error("is flattened by the transform of its node and has no direction");
+      document.diagnostics().Note(document.whole(),
+                                  Concat(light.Name(),
+                                         ": is left out: the transform of a node flattens "
+                                         "it, so it has no direction"));
     } else if (type == "spot") {
       SpotLight spot;
       spot.position = position;

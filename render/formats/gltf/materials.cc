@@ -32,47 +32,53 @@ struct Amount {
 // Reads one material.
 class MaterialReader {
  public:
-  MaterialReader(const GltfObject& object, GltfTextures& textures, Scene& scene)
-      : object_(object), textures_(textures), scene_(scene) {}
+  MaterialReader(const JsonObject& object, GltfTextures& textures, Scene& scene, bool has_colors)
+      : object_(object), textures_(textures), scene_(scene), has_colors_(has_colors) {}
 
   GltfSurface Read();
 
  private:
   // A texture of numbers times `factor`; `otherwise` stands for a texture that is not there or has
   // an error.
-  Amount ReadAmount(const GltfObject& info, PictureUse use, const PixelEncoding& encoding,
+  Amount ReadAmount(const JsonObject& info, PictureUse use, const PixelEncoding& encoding,
                     float factor, float otherwise);
-  std::int32_t AppendTexture(const GltfObject& info, const GltfTextureUse& use);
+  // All textures of a material are placed by one TEXCOORD_n.
+  void NoteTexCoord(const JsonObject& info);
+  std::int32_t AppendTexture(const JsonObject& info, const GltfTextureUse& use);
   std::int32_t Add(Material material);
   std::int32_t AddMix(std::int32_t first, std::int32_t second, const Amount& amount);
   void SetRoughness(Material& material) const;
 
-  void ReadBaseColor(const GltfObject& pbr);
-  void ReadRoughness(const GltfObject& pbr);
-  std::int32_t ReadSurface(const GltfObject& pbr);
+  void ReadSpecular();
+  void ReadBaseColor(const JsonObject& pbr);
+  void ReadRoughness(const JsonObject& pbr);
+  std::int32_t ReadSurface(const JsonObject& pbr);
   std::int32_t AddMetal();
   std::int32_t AddCoated();
   std::int32_t AddGlass();
   // What fills the glass, or kNoMedium.
-  std::int32_t AddMedium(const GltfObject& volume, double thickness);
+  std::int32_t AddMedium(const JsonObject& volume, double thickness);
   void ReadEmission();
   void ReadAlpha();
 
-  const GltfObject& object_;
+  const JsonObject& object_;
   GltfTextures& textures_;
   Scene& scene_;
+  const bool has_colors_;
   GltfSurface surface_;
   std::optional<std::uint64_t> tex_coord_;
   Rgb base_color_ = {1, 1, 1};
   float opacity_ = 1;
-  GltfObject base_texture_info_ = object_.Child("pbrMetallicRoughness").Child("baseColorTexture");
+  JsonObject base_texture_info_ = object_.Child("pbrMetallicRoughness").Child("baseColorTexture");
   std::int32_t base_texture_ = kNoTexture;
   std::int32_t normal_map_ = kNoTexture;
-  Amount alpha_;  // GGX width: the square of the roughness
-  float ior_ = 1.5F;
+  float normal_scale_ = 1;
+  Amount alpha_;           // GGX width: the square of the roughness
+  float ior_ = 1.5F;       // of glass
+  float coat_ior_ = 1.5F;  // of the coat of what is not
 };
 
-std::int32_t MaterialReader::AppendTexture(const GltfObject& info, const GltfTextureUse& use) {
+void MaterialReader::NoteTexCoord(const JsonObject& info) {
   const std::uint64_t tex_coord = GltfTextures::TexCoordOf(info);
   if (tex_coord_.value_or(tex_coord) != tex_coord) {
     info.Warning(Concat("is placed by TEXCOORD_", *tex_coord_,
@@ -80,10 +86,14 @@ std::int32_t MaterialReader::AppendTexture(const GltfObject& info, const GltfTex
   } else {
     tex_coord_ = tex_coord;
   }
+}
+
+std::int32_t MaterialReader::AppendTexture(const JsonObject& info, const GltfTextureUse& use) {
+  NoteTexCoord(info);
   return textures_.Append(info, use);
 }
 
-Amount MaterialReader::ReadAmount(const GltfObject& info, PictureUse use,
+Amount MaterialReader::ReadAmount(const JsonObject& info, PictureUse use,
                                   const PixelEncoding& encoding, float factor, float otherwise) {
   const GltfPicture* picture =
       info.exists() && factor > 0 ? textures_.FindPicture(info, use, encoding) : nullptr;
@@ -97,6 +107,8 @@ Amount MaterialReader::ReadAmount(const GltfObject& info, PictureUse use,
 
 std::int32_t MaterialReader::Add(Material material) {
   material.normal_map = normal_map_;
+  material.normal_map_follows_v = true;
+  material.normal_scale = normal_scale_;
   material.name = object_.String("name", object_.place());
   scene_.materials.push_back(std::move(material));
   return static_cast<std::int32_t>(scene_.materials.size()) - 1;
@@ -129,20 +141,44 @@ void MaterialReader::SetRoughness(Material& material) const {
   material.roughness_textures[1] = alpha_.texture;
 }
 
-void MaterialReader::ReadBaseColor(const GltfObject& pbr) {
-  const std::vector<double> factor = pbr.HeldNumbers("baseColorFactor", {1, 1, 1, 1}, kGltfFactor);
-  base_color_ = ToRgb(factor);
-  opacity_ = static_cast<float>(factor[3]);
-  if (!base_texture_info_.exists()) return;
-  const GltfPicture* picture =
-      textures_.FindPicture(base_texture_info_, PictureUse::kColors, PixelEncoding());
-  if (picture == nullptr || IsBlack(base_color_)) return;
-  base_texture_ =
-      AppendTexture(base_texture_info_, {PictureUse::kColors, PixelEncoding(), base_color_});
+// The index of refraction whose reflectance at right angles is that share of the one of `ior_`.
+void MaterialReader::ReadSpecular() {
+  const JsonObject specular = ExtensionOf(object_, "KHR_materials_specular");
+  if (!specular.exists()) return;
+  const Rgb color = ToRgb(specular.Numbers("specularColorFactor", {1, 1, 1}, kJsonZeroOrMore));
+  const double factor = specular.Held("specularFactor", 1, kJsonFactor);
+  if (specular.Has("specularTexture") || specular.Has("specularColorTexture"))
+    specular.Warning("textures are not used");
+  const double root = (static_cast<double>(ior_) - 1) / (static_cast<double>(ior_) + 1);
+  constexpr double kMostReflected = 0.9;
+  const double reflected =
+      std::min(kMostReflected, factor * static_cast<double>(MaxChannel(color)) * root * root);
+  coat_ior_ = static_cast<float>((1 + std::sqrt(reflected)) / (1 - std::sqrt(reflected)));
 }
 
-void MaterialReader::ReadRoughness(const GltfObject& pbr) {
-  const auto roughness = static_cast<float>(pbr.Held("roughnessFactor", 1, kGltfFactor));
+void MaterialReader::ReadBaseColor(const JsonObject& pbr) {
+  const std::vector<double> factor = pbr.HeldNumbers("baseColorFactor", {1, 1, 1, 1}, kJsonFactor);
+  base_color_ = ToRgb(factor);
+  opacity_ = static_cast<float>(factor[3]);
+  if (IsBlack(base_color_)) return;
+  if (base_texture_info_.exists()) {
+    const GltfPicture* picture =
+        textures_.FindPicture(base_texture_info_, PictureUse::kColors, PixelEncoding());
+    if (picture == nullptr) return;
+    base_texture_ =
+        AppendTexture(base_texture_info_, {PictureUse::kColors, PixelEncoding(), base_color_});
+  }
+  if (!has_colors_) return;
+  Texture colors;
+  colors.kind = Texture::Kind::kVertexColor;
+  colors.parts[0] = base_texture_;
+  if (base_texture_ == kNoTexture) colors.tint = base_color_;
+  base_texture_ = static_cast<std::int32_t>(scene_.textures.size());
+  scene_.textures.push_back(std::move(colors));
+}
+
+void MaterialReader::ReadRoughness(const JsonObject& pbr) {
+  const auto roughness = static_cast<float>(pbr.Held("roughnessFactor", 1, kJsonFactor));
   // Pictures of roughness are read as those of its square.
   PixelEncoding squared;
   squared.kind = PixelEncoding::Kind::kGamma;
@@ -165,19 +201,23 @@ std::int32_t MaterialReader::AddMetal() {
 std::int32_t MaterialReader::AddCoated() {
   Material coated;
   // An index of 1 reflects nothing.
-  coated.kind = ior_ > 1 ? Material::Kind::kCoatedDiffuse : Material::Kind::kDiffuse;
+  coated.kind = coat_ior_ > 1 ? Material::Kind::kCoatedDiffuse : Material::Kind::kDiffuse;
   coated.reflectance = base_color_;
   coated.texture = base_texture_;
-  coated.ior = ior_;
-  if (ior_ > 1) SetRoughness(coated);
+  coated.ior = coat_ior_;
+  coated.coat_passes_rest = coat_ior_ > 1;
+  if (coat_ior_ > 1) SetRoughness(coated);
   return Add(std::move(coated));
 }
 
-std::int32_t MaterialReader::AddMedium(const GltfObject& volume, double thickness) {
+std::int32_t MaterialReader::AddMedium(const JsonObject& volume, double thickness) {
   // A channel of less is all but gone after any length that matters.
   constexpr double kLeastColor = 1e-6;
-  const std::vector<double> color = volume.HeldNumbers("attenuationColor", {1, 1, 1}, kGltfFactor);
-  const double distance = volume.Number("attenuationDistance", HUGE_VAL, {1e-12, 1e30});
+  const std::vector<double> color = volume.HeldNumbers("attenuationColor", {1, 1, 1}, kJsonFactor);
+  const double given_distance = volume.Number("attenuationDistance", 0, {0, HUGE_VAL});
+  // For an endless distance some exporters write 0 or the largest number.
+  const bool is_endless = given_distance == 0 || given_distance > 1e30;
+  const double distance = is_endless ? HUGE_VAL : std::max(given_distance, 1e-12);
   std::array<double, 3> absorption{};
   for (std::size_t c = 0; c < 3; ++c) {
     absorption[c] = -std::log(std::max(color[c], kLeastColor)) / distance;
@@ -200,16 +240,17 @@ std::int32_t MaterialReader::AddMedium(const GltfObject& volume, double thicknes
 }
 
 std::int32_t MaterialReader::AddGlass() {
-  const GltfObject volume = object_.Extension("KHR_materials_volume");
-  const double thickness = volume.Number("thicknessFactor", 0, kGltfZeroOrMore);
+  const JsonObject volume = ExtensionOf(object_, "KHR_materials_volume");
+  const double thickness = volume.Number("thicknessFactor", 0, kJsonZeroOrMore);
   Material glass;
   glass.ior = ior_;
-  if (base_texture_ != kNoTexture) {
-    object_.Warning("light that goes through is not coloured by the texture of the base colour");
-  }
   if (thickness > 0) {
+    if (base_texture_ != kNoTexture) {
+      object_.Warning("light that goes through is not coloured by the texture of the base colour");
+    }
     glass.kind = Material::Kind::kDielectric;
-    SetRoughness(glass);
+    // Facets between equal media bend nothing.
+    if (ior_ > 1) SetRoughness(glass);
     surface_.traits.medium_inside = AddMedium(volume, thickness);
     return Add(std::move(glass));
   }
@@ -219,23 +260,27 @@ std::int32_t MaterialReader::AddGlass() {
         "thin glass is rendered as smooth; give it a volume (KHR_materials_volume) to make it "
         "rough");
   }
-  if (!IsWhite(base_color_)) {
-    object_.Warning(
-        "thin glass is rendered as clear; give it a volume (KHR_materials_volume) to colour it");
-  }
+  // Light that goes through has crossed the surface once, as a sheet.
+  glass.transmission_tint = base_color_;
+  glass.is_tinted = !IsWhite(base_color_);
+  glass.texture = base_texture_;
   return Add(std::move(glass));
 }
 
-std::int32_t MaterialReader::ReadSurface(const GltfObject& pbr) {
-  const auto metallic_factor = static_cast<float>(pbr.Held("metallicFactor", 1, kGltfFactor));
+std::int32_t MaterialReader::ReadSurface(const JsonObject& pbr) {
+  if (ExtensionOf(object_, "KHR_materials_unlit").exists()) {
+    coat_ior_ = 1;
+    return AddCoated();
+  }
+  const auto metallic_factor = static_cast<float>(pbr.Held("metallicFactor", 1, kJsonFactor));
   const PixelEncoding linear = {PixelEncoding::Kind::kLinear};
   const Amount metallic = ReadAmount(pbr.Child("metallicRoughnessTexture"), PictureUse::kBlue,
                                      linear, metallic_factor, 1);
   if (metallic.least >= 1) return AddMetal();
-  const GltfObject transmission_of = object_.Extension("KHR_materials_transmission");
+  const JsonObject transmission_of = ExtensionOf(object_, "KHR_materials_transmission");
   const Amount transmission =
       ReadAmount(transmission_of.Child("transmissionTexture"), PictureUse::kRed, linear,
-                 static_cast<float>(transmission_of.Held("transmissionFactor", 0, kGltfFactor)), 1);
+                 static_cast<float>(transmission_of.Held("transmissionFactor", 0, kJsonFactor)), 1);
   std::int32_t surface = transmission.largest > 0 ? AddGlass() : AddCoated();
   if (transmission.largest > 0 && transmission.least < 1)
     surface = AddMix(AddCoated(), surface, transmission);
@@ -243,22 +288,26 @@ std::int32_t MaterialReader::ReadSurface(const GltfObject& pbr) {
 }
 
 void MaterialReader::ReadEmission() {
-  Rgb radiance = ToRgb(object_.HeldNumbers("emissiveFactor", {0, 0, 0}, kGltfFactor));
-  radiance *= static_cast<float>(object_.Extension("KHR_materials_emissive_strength")
+  Rgb radiance = ToRgb(object_.HeldNumbers("emissiveFactor", {0, 0, 0}, kJsonFactor));
+  radiance *= static_cast<float>(ExtensionOf(object_, "KHR_materials_emissive_strength")
                                      .Number("emissiveStrength", 1, {0, 1e12}));
-  const GltfObject info = object_.Child("emissiveTexture");
+  const JsonObject info = object_.Child("emissiveTexture");
   if (IsBlack(radiance)) return;
+  AreaLight light = {radiance, object_.Bool("doubleSided", false)};
   if (info.exists()) {
     const GltfPicture* picture = textures_.FindPicture(info, PictureUse::kColors, PixelEncoding());
-    if (picture == nullptr) return;
-    if (picture->least < picture->largest) {
-      info.Warning("lights have one colour: the mean of the image is used");
-    }
-    radiance *= picture->mean;
-    if (IsBlack(radiance)) return;
+    if (picture == nullptr || !(picture->largest > 0)) return;
+    NoteTexCoord(info);
+    const std::optional<Texture> texture = textures_.Make(info, {});
+    if (!texture.has_value()) return;
+    light.picture = texture->picture;
+    light.largest_pixel = picture->largest;
+    light.mapping = texture->mapping;
+    light.wrap_u = texture->wrap_u;
+    light.wrap_v = texture->wrap_v;
   }
   surface_.traits.area_light = static_cast<std::int32_t>(scene_.area_lights.size());
-  scene_.area_lights.push_back({radiance, object_.Bool("doubleSided", false)});
+  scene_.area_lights.push_back(std::move(light));
 }
 
 void MaterialReader::ReadAlpha() {
@@ -270,7 +319,7 @@ void MaterialReader::ReadAlpha() {
   }
   Amount alpha;
   if (mode == "MASK") {
-    const auto cutoff = static_cast<float>(object_.Number("alphaCutoff", 0.5, kGltfZeroOrMore));
+    const auto cutoff = static_cast<float>(object_.Number("alphaCutoff", 0.5, kJsonZeroOrMore));
     // Of the image alone. Each pixel is there or not; between two of them the share rises.
     PixelEncoding step;
     step.kind = PixelEncoding::Kind::kStep;
@@ -284,25 +333,25 @@ void MaterialReader::ReadAlpha() {
                        opacity_, 1);
   }
   if (alpha.least >= 1) return;
-  if (surface_.traits.area_light != kNoAreaLight) {
-    object_.Warning("emits light, so its alpha is not used");
-    return;
-  }
+  // What nothing meets does not shine either.
+  if (!(alpha.largest > 0)) surface_.traits.area_light = kNoAreaLight;
   surface_.traits.alpha = alpha.largest;
   surface_.traits.alpha_texture = alpha.largest > 0 ? alpha.texture : kNoTexture;
 }
 
 GltfSurface MaterialReader::Read() {
-  const GltfObject pbr = object_.Child("pbrMetallicRoughness");
-  const double ior = object_.Extension("KHR_materials_ior").Number("ior", kDefaultIor, {0, 100});
+  const JsonObject pbr = object_.Child("pbrMetallicRoughness");
+  const double ior = ExtensionOf(object_, "KHR_materials_ior").Held("ior", kDefaultIor, {0, 100});
   ior_ = static_cast<float>(ior < 1 ? kDefaultIor : ior);
+  coat_ior_ = ior_;
   if (ior < 1) object_.Warning("an index of refraction below 1 is read as 1.5");
+  ReadSpecular();
   ReadBaseColor(pbr);
   ReadRoughness(pbr);
-  const GltfObject normals = object_.Child("normalTexture");
+  const JsonObject normals = object_.Child("normalTexture");
   if (normals.exists() && textures_.FindPicture(normals, PictureUse::kVectors,
                                                 {PixelEncoding::Kind::kLinear}) != nullptr) {
-    if (normals.Number("scale", 1, kGltfAnyNumber) != 1) normals.Warning("scale is read as 1");
+    normal_scale_ = static_cast<float>(normals.Number("scale", 1, {-1e6, 1e6}));
     normal_map_ = AppendTexture(normals, {PictureUse::kVectors, {PixelEncoding::Kind::kLinear}});
   }
   surface_.traits.material = ReadSurface(pbr);
@@ -315,13 +364,13 @@ GltfSurface MaterialReader::Read() {
 
 }  // namespace
 
-const GltfSurface& GltfMaterials::Get(std::optional<std::size_t> material) {
-  const auto [known, is_new] = surfaces_.try_emplace(material);
+const GltfSurface& GltfMaterials::Get(std::optional<std::size_t> material, bool has_colors) {
+  const auto [known, is_new] = surfaces_.try_emplace({material, has_colors});
   if (is_new) {
-    const GltfObject object = material.has_value()
+    const JsonObject object = material.has_value()
                                   ? document_.At("materials", *material)
-                                  : GltfObject(document_, nullptr, "the default material");
-    known->second = MaterialReader(object, textures_, scene_).Read();
+                                  : JsonObject(document_, nullptr, "the default material");
+    known->second = MaterialReader(object, textures_, scene_, has_colors).Read();
   }
   return known->second;
 }

@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <utility>
 
 #include "render/formats/gltf/document.h"
 #include "render/formats/gltf/textures.h"
@@ -29,14 +30,15 @@ class GltfMaterials {
   GltfMaterials(const GltfDocument& document, GltfTextures& textures, Scene& scene)
       : document_(document), textures_(textures), scene_(scene) {}
 
-  // nullopt: the material that the format gives to primitives without one. As long-lived as this.
-  [[nodiscard]] const GltfSurface& Get(std::optional<std::size_t> material);
+  // nullopt: the material that the format gives to primitives without one. `has_colors`: of meshes
+  // whose vertices have colours, by which the base colour is multiplied. As long-lived as this.
+  [[nodiscard]] const GltfSurface& Get(std::optional<std::size_t> material, bool has_colors);
 
  private:
   const GltfDocument& document_;
   GltfTextures& textures_;
   Scene& scene_;
-  std::map<std::optional<std::size_t>, GltfSurface> surfaces_;
+  std::map<std::pair<std::optional<std::size_t>, bool>, GltfSurface> surfaces_;
 };
 
 }  // namespace lucerna

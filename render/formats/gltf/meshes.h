@@ -1,14 +1,17 @@
-// Meshes of a glTF document as triangles in a space of their own.
+// Meshes of a glTF document as triangles in a space of their own, or in the world when a skin
+// places them.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "render/formats/gltf/accessors.h"
 #include "render/formats/gltf/materials.h"
+#include "render/math/transform.h"
 #include "render/scene/scene.h"
 
 namespace lucerna {
@@ -32,9 +35,19 @@ class GltfBudget {
   bool is_spent_ = false;
 };
 
+// A mesh in one of the shapes that nodes give it.
+struct GltfShape {
+  std::size_t mesh = 0;
+  std::vector<double> weights;  // of its morph targets; none: those that the mesh has
+  std::optional<std::size_t> skin;
+  auto operator<=>(const GltfShape&) const = default;
+};
+
 struct GltfPrimitive {
   TriangleMesh mesh;  // with its traits; never empty
   std::string place;  // for messages
+  // Placed by a skin: no transform of a node applies to it (glTF 2.0, 3.7.3.3).
+  bool is_in_world = false;
   [[nodiscard]] bool emits() const { return mesh.traits.area_light != kNoAreaLight; }
 };
 
@@ -45,13 +58,12 @@ class GltfMeshes {
              GltfBudget& budget)
       : document_(document), buffers_(buffers), materials_(materials), budget_(budget) {}
 
-  // The primitives of a mesh that have triangles and can be seen. Errors are in the diagnostics.
-  [[nodiscard]] std::vector<GltfPrimitive> Read(std::size_t mesh);
+  // The primitives of a mesh that have triangles and can be seen; `joints` are those of the shape's
+  // skin (skins.h). Errors are in the diagnostics.
+  [[nodiscard]] std::vector<GltfPrimitive> Read(const GltfShape& shape,
+                                                std::span<const Transform> joints);
 
  private:
-  [[nodiscard]] std::optional<TriangleMesh> ReadPrimitive(const GltfObject& primitive,
-                                                          const GltfSurface& surface);
-
   const GltfDocument& document_;
   GltfBuffers& buffers_;
   GltfMaterials& materials_;

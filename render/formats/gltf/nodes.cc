@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "render/base/text.h"
+#include "render/formats/gltf/skins.h"
 #include "render/formats/mesh_placement.h"
 
 namespace lucerna {
@@ -26,20 +27,19 @@ std::optional<Transform> TurnBy(const std::array<double, 4>& q) {
 }
 
 // The node's own transform; nullopt after an error.
-std::optional<Transform> LocalTransform(const GltfObject& node) {
+std::optional<Transform> LocalTransform(const JsonObject& node) {
   if (node.Has("matrix")) {
     const std::vector<double> columns =
-        node.Numbers("matrix", {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}, kGltfAnyNumber);
-    std::array<std::array<double, 4>, 4> rows{};
-    for (std::size_t i = 0; i < 16; ++i)
-      rows[i % 4][i / 4] = columns[i];
-    if (rows[3] == std::array<double, 4>{0, 0, 0, 1}) return Transform(rows);
+        node.Numbers("matrix", {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}, kJsonAnyNumber);
+    std::array<double, 16> numbers{};
+    std::ranges::copy(columns, numbers.begin());
+    if (const std::optional<Transform> affine = AffineOf(numbers)) return affine;
     node.Error("matrix must be affine: its fourth row, numbers 4, 8, 12 and 16, must be 0 0 0 1");
     return std::nullopt;
   }
-  const std::vector<double> t = node.Numbers("translation", {0, 0, 0}, kGltfAnyNumber);
-  const std::vector<double> r = node.Numbers("rotation", {0, 0, 0, 1}, kGltfAnyNumber);
-  const std::vector<double> s = node.Numbers("scale", {1, 1, 1}, kGltfAnyNumber);
+  const std::vector<double> t = node.Numbers("translation", {0, 0, 0}, kJsonAnyNumber);
+  const std::vector<double> r = node.Numbers("rotation", {0, 0, 0, 1}, kJsonAnyNumber);
+  const std::vector<double> s = node.Numbers("scale", {1, 1, 1}, kJsonAnyNumber);
   const std::optional<Transform> turn = TurnBy({r[0], r[1], r[2], r[3]});
   if (!turn.has_value()) {
     node.Error("rotation is a quaternion of length 0");
@@ -52,7 +52,7 @@ class NodeWalk {
  public:
   NodeWalk(const GltfDocument& document, GltfBuffers& buffers, GltfBudget& budget)
       : document_(document), buffers_(buffers), budget_(budget) {
-    places_.meshes.resize(document.Count("meshes"));
+    if (document.Count("skins") > 0) node_to_world_.resize(document.Count("nodes"));
   }
 
   GltfPlaces Walk();
@@ -61,19 +61,23 @@ class NodeWalk {
   struct Open {
     std::size_t node;
     Transform parent;
+    bool is_visible;
   };
 
   [[nodiscard]] std::vector<std::size_t> Roots() const;
-  // Returns the node's transform, or nullopt when its branch is left out.
-  std::optional<Transform> Visit(const GltfObject& node, const Transform& parent);
-  void PlaceMesh(const GltfObject& node, std::size_t mesh, const Transform& to_world);
+  // Returns the node's transform, or nullopt when its branch is left out after an error.
+  std::optional<Transform> Visit(const JsonObject& node, const Open& open);
+  void PlaceMesh(const JsonObject& node, std::size_t mesh, const Transform& to_world);
   // EXT_mesh_gpu_instancing: one transform within the node for each instance.
-  void PlaceInstances(const GltfObject& instancing, std::size_t mesh, const Transform& to_world);
+  void PlaceInstances(const JsonObject& instancing, const Transform& to_world,
+                      std::vector<Transform>& places);
+  void ReadSkins();
 
   const GltfDocument& document_;
   GltfBuffers& buffers_;
   GltfBudget& budget_;
   GltfPlaces places_;
+  std::vector<std::optional<Transform>> node_to_world_;  // for skins
 };
 
 std::vector<std::size_t> NodeWalk::Roots() const {
@@ -94,9 +98,9 @@ std::vector<std::size_t> NodeWalk::Roots() const {
   return roots;
 }
 
-void NodeWalk::PlaceInstances(const GltfObject& instancing, std::size_t mesh,
-                              const Transform& to_world) {
-  const GltfObject attributes = instancing.Child("attributes");
+void NodeWalk::PlaceInstances(const JsonObject& instancing, const Transform& to_world,
+                              std::vector<Transform>& places) {
+  const JsonObject attributes = instancing.Child("attributes");
   constexpr std::array kNames = {"TRANSLATION", "ROTATION", "SCALE"};
   std::array<const GltfAccessor*, 3> parts{};
   std::optional<std::size_t> count;
@@ -134,61 +138,78 @@ void NodeWalk::PlaceInstances(const GltfObject& instancing, std::size_t mesh,
       attributes.Error(Concat("the transform of instance ", i, " is not finite"));
       return;
     }
-    places_.meshes[mesh].push_back(placed);
+    places.push_back(placed);
   }
 }
 
-void NodeWalk::PlaceMesh(const GltfObject& node, std::size_t mesh, const Transform& to_world) {
-  if (node.Has("skin")) {
-    document_.diagnostics().Warning(document_.whole(),
-                                    "skins are ignored: meshes stand as they are modelled");
+void NodeWalk::PlaceMesh(const JsonObject& node, std::size_t mesh, const Transform& to_world) {
+  const std::optional<std::size_t> skin = node.Index("skin", "skins");
+  if (node.Has("skin") && !skin.has_value()) return;
+  const GltfShape shape = {mesh, node.NumberList("weights", kJsonAnyNumber), skin};
+  const JsonObject instancing = ExtensionOf(node, "EXT_mesh_gpu_instancing");
+  if (instancing.exists() && skin.has_value()) {
+    node.Warning("has a skin, so its instances (EXT_mesh_gpu_instancing) are left out");
+  } else if (instancing.exists()) {
+    PlaceInstances(instancing, to_world, places_.meshes[shape]);
+    return;
   }
-  const GltfObject instancing = node.Extension("EXT_mesh_gpu_instancing");
-  if (instancing.exists()) {
-    PlaceInstances(instancing, mesh, to_world);
-  } else if (budget_.Take(0, kInstanceBytes)) {
-    places_.meshes[mesh].push_back(to_world);
-  }
+  if (budget_.Take(0, kInstanceBytes)) places_.meshes[shape].push_back(to_world);
 }
 
-std::optional<Transform> NodeWalk::Visit(const GltfObject& node, const Transform& parent) {
+std::optional<Transform> NodeWalk::Visit(const JsonObject& node, const Open& open) {
   const std::optional<Transform> local = LocalTransform(node);
   if (!local.has_value()) return std::nullopt;
-  const Transform to_world = parent * *local;
+  const Transform to_world = open.parent * *local;
   if (!to_world.IsFinite()) {
     node.Error("its transform in the scene is not finite");
     return std::nullopt;
   }
-  if (const auto mesh = node.Index("mesh", "meshes")) PlaceMesh(node, *mesh, to_world);
+  if (!node_to_world_.empty()) node_to_world_[open.node] = to_world;
   if (const auto camera = node.Index("camera", "cameras"))
     places_.cameras.push_back({*camera, to_world});
-  const GltfObject light = node.Extension("KHR_lights_punctual");
+  if (!open.is_visible) return to_world;
+  if (const auto mesh = node.Index("mesh", "meshes")) PlaceMesh(node, *mesh, to_world);
+  const JsonObject light = ExtensionOf(node, "KHR_lights_punctual");
   // Its array is not at the top of the document, so its range is checked by who reads the lights.
   if (const auto index = light.Whole("light")) places_.lights.push_back({*index, to_world});
   return to_world;
 }
 
+void NodeWalk::ReadSkins() {
+  for (const auto& [shape, places] : places_.meshes) {
+    if (!shape.skin.has_value() || places_.joints.contains(*shape.skin)) continue;
+    std::optional<std::vector<Transform>> joints =
+        ReadGltfSkin(document_, *shape.skin, buffers_, budget_, node_to_world_);
+    if (joints.has_value()) places_.joints.emplace(*shape.skin, *std::move(joints));
+  }
+}
+
 GltfPlaces NodeWalk::Walk() {
   std::vector<bool> is_visited(document_.Count("nodes"));
   std::vector<Open> open;
-  const auto push = [&](std::vector<std::size_t> nodes, const Transform& parent) {
+  const auto push = [&](const std::vector<std::size_t>& nodes, const Transform& parent,
+                        bool is_visible) {
     // The first is to be popped first.
     for (auto node = nodes.rbegin(); node != nodes.rend(); ++node)
-      open.push_back({*node, parent});
+      open.push_back({*node, parent, is_visible});
   };
-  push(Roots(), Transform());
+  push(Roots(), Transform(), true);
   while (!open.empty() && !budget_.is_spent()) {
-    const Open next = open.back();
+    Open next = open.back();
     open.pop_back();
-    const GltfObject node = document_.At("nodes", next.node);
+    const JsonObject node = document_.At("nodes", next.node);
     if (is_visited[next.node]) {
       node.Error("is reached twice: each node has one parent, and none is its own ancestor");
       continue;
     }
     is_visited[next.node] = true;
-    if (const std::optional<Transform> to_world = Visit(node, next.parent))
-      push(node.Indices("children", "nodes"), *to_world);
+    next.is_visible =
+        next.is_visible && ExtensionOf(node, "KHR_node_visibility").Bool("visible", true);
+    if (const std::optional<Transform> to_world = Visit(node, next))
+      push(node.Indices("children", "nodes"), *to_world, next.is_visible);
   }
+  // Joints may come after the meshes that follow them. After an error some may be missing.
+  if (!document_.diagnostics().has_error()) ReadSkins();
   return std::move(places_);
 }
 

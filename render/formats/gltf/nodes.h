@@ -2,7 +2,7 @@
 #pragma once
 
 #include <cstddef>
-#include <optional>
+#include <map>
 #include <vector>
 
 #include "render/formats/gltf/accessors.h"
@@ -19,11 +19,14 @@ struct GltfPlace {
 };
 
 struct GltfPlaces {
-  std::vector<std::vector<Transform>> meshes;  // by the number of the mesh
-  std::vector<GltfPlace> cameras, lights;      // in the order in which the tree is walked
+  std::map<GltfShape, std::vector<Transform>> meshes;
+  // What the joints of a skin do (skins.h), by its number; not of a skin that has an error.
+  std::map<std::size_t, std::vector<Transform>> joints;
+  std::vector<GltfPlace> cameras, lights;  // in the order in which the tree is walked
 };
 
-// Walks the scene that the document shows. Each node is visited once: one that is reached twice is
+// Walks the scene that the document shows. Of nodes that are not visible (KHR_node_visibility) only
+// cameras count. Each node is visited once: one that is reached twice is
 // an error, so there are no cycles. Errors are in the diagnostics.
 [[nodiscard]] GltfPlaces WalkNodes(const GltfDocument& document, GltfBuffers& buffers,
                                    GltfBudget& budget);

@@ -11,22 +11,7 @@ namespace {
 
 constexpr const char* kTransform = "KHR_texture_transform";
 
-Rgb MeanOf(const Picture& picture) {
-  double sum[3] = {};
-  for (int y = 0; y < picture.height; ++y) {
-    for (int x = 0; x < picture.width; ++x) {
-      const Rgb color = picture.At(x, y);
-      sum[0] += static_cast<double>(color.r);
-      sum[1] += static_cast<double>(color.g);
-      sum[2] += static_cast<double>(color.b);
-    }
-  }
-  const double pixels = static_cast<double>(picture.width) * picture.height;
-  return {static_cast<float>(sum[0] / pixels), static_cast<float>(sum[1] / pixels),
-          static_cast<float>(sum[2] / pixels)};
-}
-
-Texture::Wrap WrapOf(const GltfObject& sampler, const char* name) {
+Texture::Wrap WrapOf(const JsonObject& sampler, const char* name) {
   constexpr std::uint64_t kRepeat = 10497;
   constexpr std::uint64_t kMirroredRepeat = 33648;
   constexpr std::uint64_t kClampToEdge = 33071;
@@ -40,9 +25,9 @@ Texture::Wrap WrapOf(const GltfObject& sampler, const char* name) {
 // The file's v points down the image, the scene's v = 1 - v up. A point (u, v) of the file becomes
 // (cos·sx·u + sin·sy·v + ox, -sin·sx·u + cos·sy·v + oy), as three.js has it and as the examples of
 // the extension need it; the matrix printed there turns the other way.
-TextureMapping MappingOf(const GltfObject& texture_info) {
+TextureMapping MappingOf(const JsonObject& texture_info) {
   TextureMapping mapping;
-  const GltfObject transform = texture_info.Extension(kTransform);
+  const JsonObject transform = ExtensionOf(texture_info, kTransform);
   if (!transform.exists()) return mapping;
   const std::vector<double> offset = transform.Numbers("offset", {0, 0}, {-1e6, 1e6});
   const std::vector<double> scale = transform.Numbers("scale", {1, 1}, {-1e6, 1e6});
@@ -64,18 +49,18 @@ TextureMapping MappingOf(const GltfObject& texture_info) {
 
 }  // namespace
 
-std::uint64_t GltfTextures::TexCoordOf(const GltfObject& texture_info) {
+std::uint64_t GltfTextures::TexCoordOf(const JsonObject& texture_info) {
   const std::uint64_t own = texture_info.Whole("texCoord").value_or(0);
-  return texture_info.Extension(kTransform).Whole("texCoord").value_or(own);
+  return ExtensionOf(texture_info, kTransform).Whole("texCoord").value_or(own);
 }
 
-std::optional<std::size_t> GltfTextures::ImageOf(const GltfObject& texture_info) {
+std::optional<std::size_t> GltfTextures::ImageOf(const JsonObject& texture_info) {
   const std::optional<std::size_t> index = texture_info.Index("index", "textures");
   if (!index.has_value()) {
     if (!texture_info.Has("index")) texture_info.Error("needs index, the number of a texture");
     return std::nullopt;
   }
-  const GltfObject texture = document_.At("textures", *index);
+  const JsonObject texture = document_.At("textures", *index);
   if (texture.Has("source")) return texture.Index("source", "images");
   texture.Error("has no source that is PNG or JPEG");
   return std::nullopt;
@@ -84,7 +69,7 @@ std::optional<std::size_t> GltfTextures::ImageOf(const GltfObject& texture_info)
 std::optional<GltfPicture> GltfTextures::ReadPicture(std::size_t image, PictureUse use,
                                                      const PixelEncoding& encoding) {
   if (faulty_images_.contains(image)) return std::nullopt;
-  const GltfObject object = document_.At("images", image);
+  const JsonObject object = document_.At("images", image);
   // Errors of a view are reported by the buffers.
   std::optional<std::string_view> view;
   if (!object.Has("uri")) {
@@ -111,11 +96,10 @@ std::optional<GltfPicture> GltfTextures::ReadPicture(std::size_t image, PictureU
   picture.picture = *std::move(read);
   picture.least = picture.picture->Smallest();
   picture.largest = picture.picture->Largest();
-  picture.mean = MeanOf(*picture.picture);
   return picture;
 }
 
-const GltfPicture* GltfTextures::FindPicture(const GltfObject& texture_info, PictureUse use,
+const GltfPicture* GltfTextures::FindPicture(const JsonObject& texture_info, PictureUse use,
                                              const PixelEncoding& encoding) {
   const std::optional<std::size_t> image = ImageOf(texture_info);
   if (!image.has_value()) return nullptr;
@@ -126,11 +110,12 @@ const GltfPicture* GltfTextures::FindPicture(const GltfObject& texture_info, Pic
   return known->second.has_value() ? &*known->second : nullptr;
 }
 
-std::int32_t GltfTextures::Append(const GltfObject& texture_info, const GltfTextureUse& use) {
+std::optional<Texture> GltfTextures::Make(const JsonObject& texture_info,
+                                          const GltfTextureUse& use) {
   const GltfPicture* picture = FindPicture(texture_info, use.use, use.encoding);
-  if (picture == nullptr) return kNoTexture;
+  if (picture == nullptr) return std::nullopt;
   const std::optional<std::size_t> index = texture_info.Index("index", "textures");
-  const GltfObject of_file = document_.At("textures", *index);
+  const JsonObject of_file = document_.At("textures", *index);
   Texture texture;
   texture.kind = Texture::Kind::kPicture;
   texture.picture = picture->picture;
@@ -141,13 +126,20 @@ std::int32_t GltfTextures::Append(const GltfObject& texture_info, const GltfText
     texture.tint = use.factor;
   }
   texture.mapping = MappingOf(texture_info);
-  if (of_file.Has("sampler")) {
-    if (const std::optional<std::size_t> sampler = of_file.Index("sampler", "samplers")) {
-      texture.wrap_u = WrapOf(document_.At("samplers", *sampler), "wrapS");
-      texture.wrap_v = WrapOf(document_.At("samplers", *sampler), "wrapT");
-    }
+  if (const std::optional<std::size_t> number = of_file.Index("sampler", "samplers")) {
+    const JsonObject sampler = document_.At("samplers", *number);
+    texture.wrap_u = WrapOf(sampler, "wrapS");
+    texture.wrap_v = WrapOf(sampler, "wrapT");
+    constexpr std::uint64_t kNearest = 9728;
+    texture.is_nearest = sampler.Whole("magFilter") == kNearest;
   }
-  textures_.push_back(std::move(texture));
+  return texture;
+}
+
+std::int32_t GltfTextures::Append(const JsonObject& texture_info, const GltfTextureUse& use) {
+  std::optional<Texture> texture = Make(texture_info, use);
+  if (!texture.has_value()) return kNoTexture;
+  textures_.push_back(*std::move(texture));
   return static_cast<std::int32_t>(textures_.size()) - 1;
 }
 

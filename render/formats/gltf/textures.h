@@ -23,7 +23,6 @@ namespace lucerna {
 struct GltfPicture {
   std::shared_ptr<const Picture> picture;
   float least = 0, largest = 0;  // of all channels
-  Rgb mean;
 };
 
 // Which picture a texture shows, and how.
@@ -41,18 +40,21 @@ class GltfTextures {
       : document_(document), buffers_(buffers), assets_(assets), textures_(textures) {}
 
   // The picture that a textureInfo names. nullptr: an error, which is in the diagnostics once.
-  [[nodiscard]] const GltfPicture* FindPicture(const GltfObject& texture_info, PictureUse use,
+  [[nodiscard]] const GltfPicture* FindPicture(const JsonObject& texture_info, PictureUse use,
                                                const PixelEncoding& encoding);
-  // Appends the texture of the scene that a textureInfo names, and returns its number; kNoTexture
-  // after an error. Requires that FindPicture found its picture.
-  [[nodiscard]] std::int32_t Append(const GltfObject& texture_info, const GltfTextureUse& use);
+  // The texture that a textureInfo names; nullopt after an error. Requires that FindPicture found
+  // its picture.
+  [[nodiscard]] std::optional<Texture> Make(const JsonObject& texture_info,
+                                            const GltfTextureUse& use);
+  // Appends it to the scene's, and returns its number; kNoTexture after an error.
+  [[nodiscard]] std::int32_t Append(const JsonObject& texture_info, const GltfTextureUse& use);
   // Which TEXCOORD_n it is placed by.
-  [[nodiscard]] static std::uint64_t TexCoordOf(const GltfObject& texture_info);
+  [[nodiscard]] static std::uint64_t TexCoordOf(const JsonObject& texture_info);
 
  private:
   using Key = std::tuple<std::size_t, PictureUse, PixelEncoding::Kind, double>;
 
-  [[nodiscard]] std::optional<std::size_t> ImageOf(const GltfObject& texture_info);
+  [[nodiscard]] std::optional<std::size_t> ImageOf(const JsonObject& texture_info);
   [[nodiscard]] std::optional<GltfPicture> ReadPicture(std::size_t image, PictureUse use,
                                                        const PixelEncoding& encoding);
 

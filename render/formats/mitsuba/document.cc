@@ -13,6 +13,7 @@
 #include <pugixml.hpp>
 
 #include "render/base/text.h"
+#include "render/formats/pbrt/spectrum_files.h"
 
 namespace lucerna {
 namespace {
@@ -25,6 +26,10 @@ constexpr std::array<std::string_view, 11> kValueTags = {
     "spectrum",  "srgb",    "string", "transform", "vector"};
 // Of objects in objects.
 constexpr int kMaxDepth = 32;
+// Of an attribute in which defaults are put in, which may be long themselves.
+constexpr std::size_t kMaxAttribute = 1 << 20;
+// Of all that is put in: values are kept.
+constexpr std::uint64_t kMaxPutIn = 1 << 26;
 
 bool IsIn(std::span<const std::string_view> names, std::string_view name) {
   return std::ranges::find(names, name) != names.end();
@@ -41,31 +46,6 @@ std::string WithUnderscores(std::string_view name) {
     result += absl::ascii_tolower(letter);
   }
   return result;
-}
-
-// The numbers of a list that spaces and commas separate; absent when something else is in it, or a
-// number that single precision cannot hold.
-std::optional<std::vector<double>> NumbersOf(std::string_view text) {
-  std::vector<double> numbers;
-  constexpr std::string_view kBetween = " \t\r\n,";
-  std::size_t at = 0;
-  while ((at = text.find_first_not_of(kBetween, at)) != std::string_view::npos) {
-    std::string_view word = text.substr(at, text.find_first_of(kBetween, at) - at);
-    at += word.size();
-    if (word.starts_with('+')) word.remove_prefix(1);
-    double value = 0;
-    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-    if (error == std::errc::result_out_of_range) {
-      value = 0;  // too small; what is too large has more than 38 digits or an exponent
-      if (word.find("e-") == std::string_view::npos && word.find("E-") == std::string_view::npos)
-        return std::nullopt;
-    } else if (error != std::errc()) {
-      return std::nullopt;
-    }
-    if (end != word.data() + word.size() || !(std::abs(value) <= 3.4e38)) return std::nullopt;
-    numbers.push_back(value);
-  }
-  return numbers;
 }
 
 // One text of a scene: the main file, or one that is included.
@@ -89,17 +69,46 @@ Text TextOf(const std::string* name, std::string_view text) {
   return result;
 }
 
+// "0.6.0"; that of today where it is absent or says nothing.
+std::array<int, 3> VersionOf(std::string_view text) {
+  if (text.empty()) return MitsubaDocument().version;
+  std::array<int, 3> version = {};
+  for (std::size_t i = 0; i < version.size() && !text.empty(); ++i) {
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), version[i]);
+    if (error != std::errc()) return MitsubaDocument().version;
+    text.remove_prefix(static_cast<std::size_t>(end - text.data()));
+    if (text.starts_with('.')) text.remove_prefix(1);
+  }
+  return version;
+}
+
 class DocumentReader {
  public:
   DocumentReader(AssetReader& assets, Diagnostics& diagnostics, MitsubaDocument& document)
       : assets_(assets), diagnostics_(diagnostics), document_(document) {}
 
-  void ReadText(const std::string& path, std::string_view text);
+  // The main file.
+  void Read(const std::string& path, std::string_view text) {
+    ReadText(path, text, 0, document_.scene);
+    AddIds(document_.scene);
+    AddAliases();
+  }
 
  private:
+  struct Alias {
+    std::string of, name;
+    SourceLocation location;
+  };
+
+  // Reads what the root has, or the root itself where it is no scene, into `object`.
+  void ReadText(const std::string& path, std::string_view bytes, int depth, MitsubaObject& object);
+  void AddIds(const MitsubaObject& object);
+  void AddAliases();
   // The attribute with the defaults of the scene put in; empty when it is absent.
   std::string AttributeOf(const Text& text, const pugi::xml_node& node, const char* name);
+  // The children of `node`, or one of them, as parts of `object`.
   void ReadInto(const Text& text, const pugi::xml_node& node, int depth, MitsubaObject& object);
+  void ReadElement(const Text& text, const pugi::xml_node& node, int depth, MitsubaObject& object);
   void ReadObject(const Text& text, const pugi::xml_node& node, int depth, MitsubaObject& parent);
   void ReadValue(const Text& text, const pugi::xml_node& node, MitsubaObject& object);
   bool ReadSpectrum(const std::string& value, Parameter& parameter);
@@ -109,7 +118,7 @@ class DocumentReader {
   std::array<double, 3> ReadTriple(const Text& text, const pugi::xml_node& node, double otherwise);
   double ReadNumber(const Text& text, const pugi::xml_node& node, const char* name,
                     double otherwise);
-  void Include(const Text& text, const pugi::xml_node& node);
+  void Include(const Text& text, const pugi::xml_node& node, int depth, MitsubaObject& object);
   void Error(const Text& text, const pugi::xml_node& node, std::string_view message) {
     diagnostics_.Error(text.LocationOf(node), Concat("<", node.name(), ">: ", message));
   }
@@ -118,37 +127,53 @@ class DocumentReader {
   Diagnostics& diagnostics_;
   MitsubaDocument& document_;
   std::map<std::string, std::string> defaults_;
+  std::vector<Alias> aliases_;
   std::vector<std::string> open_texts_;
   std::uint64_t texts_read_ = 0;
+  std::uint64_t put_in_bytes_ = 0;  // of defaults
 };
 
 std::string DocumentReader::AttributeOf(const Text& text, const pugi::xml_node& node,
                                         const char* name) {
-  std::string value = node.attribute(name).value();
-  for (std::size_t at = value.find('$'); at != std::string::npos; at = value.find('$', at)) {
+  const std::string_view text_of = node.attribute(name).value();
+  std::string value;
+  std::string_view rest = text_of;
+  for (std::size_t at = rest.find('$'); at != std::string::npos; at = rest.find('$')) {
     std::size_t end = at + 1;
-    while (end < value.size() &&
-           (absl::ascii_isalnum(static_cast<unsigned char>(value[end])) || value[end] == '_')) {
+    while (end < rest.size() && (absl::ascii_isalnum(static_cast<unsigned char>(rest[end])) ||
+                                 rest[end] == '_' || rest[end] == '-')) {
       ++end;
     }
-    const std::string variable = value.substr(at + 1, end - at - 1);
-    const auto found = defaults_.find(variable);
+    // As Mitsuba, the longest name that there is: a dash may be part of it or follow it.
+    std::string variable(rest.substr(at + 1, end - at - 1));
+    auto found = defaults_.find(variable);
+    while (found == defaults_.end() && !variable.empty()) {
+      variable.pop_back();
+      found = defaults_.find(variable);
+    }
     if (found == defaults_.end()) {
       Error(text, node,
-            Concat("there is no value of ", Quoted("$" + variable),
+            Concat("there is no value of ", Quoted(rest.substr(at, end - at)),
                    "; give one by <default name=... value=.../> before it"));
       return "";
     }
-    value.replace(at, end - at, found->second);
-    at += found->second.size();
+    value += rest.substr(0, at);
+    value += found->second;
+    rest.remove_prefix(at + 1 + variable.size());
+    put_in_bytes_ += found->second.size();
+    if (value.size() > kMaxAttribute || put_in_bytes_ > kMaxPutIn) {
+      Error(text, node, Concat(Quoted(name), " is too long with its defaults put in"));
+      return "";
+    }
   }
+  value += rest;
   return value;
 }
 
 double DocumentReader::ReadNumber(const Text& text, const pugi::xml_node& node, const char* name,
                                   double otherwise) {
   if (node.attribute(name).empty()) return otherwise;
-  const auto numbers = NumbersOf(AttributeOf(text, node, name));
+  const auto numbers = ListedNumbers(AttributeOf(text, node, name));
   if (numbers.has_value() && numbers->size() == 1) return numbers->front();
   Error(text, node, Concat(Quoted(name), " must be a number"));
   return otherwise;
@@ -160,7 +185,7 @@ std::array<double, 3> DocumentReader::ReadTriple(const Text& text, const pugi::x
     return {ReadNumber(text, node, "x", otherwise), ReadNumber(text, node, "y", otherwise),
             ReadNumber(text, node, "z", otherwise)};
   }
-  const auto numbers = NumbersOf(AttributeOf(text, node, "value"));
+  const auto numbers = ListedNumbers(AttributeOf(text, node, "value"));
   if (numbers.has_value() && numbers->size() == 1)
     return {numbers->front(), numbers->front(), numbers->front()};
   if (numbers.has_value() && numbers->size() == 3)
@@ -181,12 +206,14 @@ StatusOr<Transform> DocumentReader::ReadStep(const Text& text, const pugi::xml_n
   }
   if (kind == "rotate") {
     const std::array<double, 3> axis = ReadTriple(text, node, 0);
+    if (axis == std::array<double, 3>{} && ReadNumber(text, node, "angle", 0) == 0)
+      return Transform();
     return Transform::Rotate(ReadNumber(text, node, "angle", 0), axis[0], axis[1], axis[2]);
   }
   if (kind == "lookat" || kind == "lookAt") {
     const auto triple = [&](const char* name, const std::array<double, 3>& otherwise) {
       if (node.attribute(name).empty()) return otherwise;
-      const auto numbers = NumbersOf(AttributeOf(text, node, name));
+      const auto numbers = ListedNumbers(AttributeOf(text, node, name));
       if (numbers.has_value() && numbers->size() == 3)
         return std::array<double, 3>{(*numbers)[0], (*numbers)[1], (*numbers)[2]};
       Error(text, node, Concat(Quoted(name), " must be three numbers"));
@@ -204,7 +231,7 @@ StatusOr<Transform> DocumentReader::ReadStep(const Text& text, const pugi::xml_n
     return from_world.Inverse();
   }
   if (kind == "matrix") {
-    const auto numbers = NumbersOf(AttributeOf(text, node, "value"));
+    const auto numbers = ListedNumbers(AttributeOf(text, node, "value"));
     std::array<std::array<double, 4>, 4> rows = {
         {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 1}}};
     if (!numbers.has_value() || (numbers->size() != 9 && numbers->size() != 16))
@@ -212,7 +239,12 @@ StatusOr<Transform> DocumentReader::ReadStep(const Text& text, const pugi::xml_n
     const std::size_t side = numbers->size() == 9 ? 3 : 4;
     for (std::size_t i = 0; i < numbers->size(); ++i)
       rows[i / side][i % side] = (*numbers)[i];
-    if (rows[3] != std::array<double, 4>{0, 0, 0, 1}) {
+    // What exporters multiply is rounded.
+    constexpr std::array<double, 4> kLast = {0, 0, 0, 1};
+    const bool is_affine = std::ranges::equal(
+        rows[3], kLast, [](double a, double b) { return std::abs(a - b) <= 1e-4; });
+    rows[3] = kLast;
+    if (!is_affine) {
       return absl::InvalidArgumentError(
           "\"value\" must be affine: its last four numbers must be 0 0 0 1");
     }
@@ -241,20 +273,26 @@ Transform DocumentReader::ReadTransform(const Text& text, const pugi::xml_node& 
   return transform;
 }
 
-// One value at all wavelengths, or pairs "wavelength:value".
+// One value at all wavelengths, pairs "wavelength:value" or, in old files, red, green and blue.
 bool DocumentReader::ReadSpectrum(const std::string& value, Parameter& parameter) {
   const std::size_t pairs = static_cast<std::size_t>(std::ranges::count(value, ':'));
   std::string list = value;
   std::ranges::replace(list, ':', ' ');
-  const auto numbers = NumbersOf(list);
+  const auto numbers = ListedNumbers(list);
   if (!numbers.has_value()) return false;
   if (pairs == 0 && numbers->size() == 1) {
     parameter.type = "rgb";
     parameter.numbers.assign(3, numbers->front());
     return true;
   }
+  if (pairs == 0 && numbers->size() == 3 && document_.is_old()) {
+    parameter.type = "rgb";
+    parameter.numbers = *numbers;
+    return true;
+  }
   parameter.type = "spectrum";
   parameter.numbers = *numbers;
+  PartEqualWavelengths(parameter.numbers);
   return pairs > 0 && numbers->size() == 2 * pairs;
 }
 
@@ -293,7 +331,7 @@ void DocumentReader::ReadValue(const Text& text, const pugi::xml_node& node,
     parameter.numbers.assign(triple.begin(), triple.end());
   } else if (tag == "float" || tag == "integer") {
     parameter.type = tag;
-    const auto numbers = NumbersOf(value);
+    const auto numbers = ListedNumbers(value);
     if (!numbers.has_value() || numbers->size() != 1) return wrong("a number");
     if (tag == "integer" && (numbers->front() != std::floor(numbers->front()) ||
                              !(std::abs(numbers->front()) < 0x1p31))) {
@@ -312,7 +350,7 @@ void DocumentReader::ReadValue(const Text& text, const pugi::xml_node& node,
         return wrong("a colour such as #ff8000");
       numbers = {(code >> 16U) / 255.0, ((code >> 8U) & 255U) / 255.0, (code & 255U) / 255.0};
     } else {
-      numbers = NumbersOf(value);
+      numbers = ListedNumbers(value);
     }
     if (!numbers.has_value() || (numbers->size() != 1 && numbers->size() != 3))
       return wrong("one number or three");
@@ -326,12 +364,24 @@ void DocumentReader::ReadValue(const Text& text, const pugi::xml_node& node,
     if (!node.attribute("filename").empty()) {
       parameter.type = "spectrum";
       parameter.strings.push_back(AttributeOf(text, node, "filename"));
+      std::vector<Parameter> read = {std::move(parameter)};
+      ReadSpectrumFiles(assets_, read, diagnostics_);
+      parameter = std::move(read.front());
+      PartEqualWavelengths(parameter.numbers);
     } else if (!ReadSpectrum(value, parameter)) {
-      return wrong("one number, or pairs \"wavelength:value\"");
+      return wrong(document_.is_old() ? "one number, three, or pairs \"wavelength:value\""
+                                      : "one number, or pairs \"wavelength:value\"");
     }
   } else {
     parameter.type = "blackbody";
-    parameter.numbers.push_back(ReadNumber(text, node, "temperature", 6500));
+    std::string temperature = AttributeOf(text, node, "temperature");
+    if (temperature.ends_with('K')) temperature.pop_back();
+    const auto kelvin = ListedNumbers(temperature.empty() ? "6500" : temperature);
+    if (!kelvin.has_value() || kelvin->size() != 1) {
+      Error(text, node, "\"temperature\" must be a number");
+      return;
+    }
+    parameter.numbers = {kelvin->front(), ReadNumber(text, node, "scale", 1)};
   }
   object.values.push_back(std::move(parameter));
 }
@@ -344,9 +394,11 @@ void DocumentReader::ReadObject(const Text& text, const pugi::xml_node& node, in
   }
   MitsubaObject& object = parent.children.emplace_back();
   object.tag = node.name();
+  if (object.tag == "spectrum") object.tag = "texture";
   object.type = AttributeOf(text, node, "type");
   object.id = AttributeOf(text, node, "id");
-  object.name = WithUnderscores(AttributeOf(text, node, "name"));
+  object.called = AttributeOf(text, node, "name");
+  object.name = WithUnderscores(object.called);
   object.location = text.LocationOf(node);
   if (object.tag == "ref") {
     if (object.id.empty()) Error(text, node, "needs the id of what it refers to");
@@ -356,7 +408,8 @@ void DocumentReader::ReadObject(const Text& text, const pugi::xml_node& node, in
   ReadInto(text, node, depth, object);
 }
 
-void DocumentReader::Include(const Text& text, const pugi::xml_node& node) {
+void DocumentReader::Include(const Text& text, const pugi::xml_node& node, int depth,
+                             MitsubaObject& object) {
   const std::string path = AttributeOf(text, node, "filename");
   const SceneLimits& limits = assets_.limits();
   if (std::ranges::find(open_texts_, path) != open_texts_.end()) {
@@ -365,7 +418,13 @@ void DocumentReader::Include(const Text& text, const pugi::xml_node& node) {
              ++texts_read_ > limits.max_files) {
     Error(text, node, "too many files are included");
   } else if (const StatusOr<std::string> included = assets_.ReadText(path); included.ok()) {
-    ReadText(path, *included);
+    const std::size_t parts_before = object.children.size();
+    ReadText(path, *included, depth, object);
+    const std::string called = AttributeOf(text, node, "name");
+    if (!called.empty() && object.children.size() == parts_before + 1) {
+      object.children.back().called = called;
+      object.children.back().name = WithUnderscores(called);
+    }
   } else {
     Error(text, node, std::string(included.status().message()));
   }
@@ -374,29 +433,41 @@ void DocumentReader::Include(const Text& text, const pugi::xml_node& node) {
 void DocumentReader::ReadInto(const Text& text, const pugi::xml_node& node, int depth,
                               MitsubaObject& object) {
   for (const pugi::xml_node& child : node.children()) {
-    if (child.type() != pugi::node_element) continue;
-    const std::string_view tag = child.name();
-    if (IsIn(kObjectTags, tag)) {
-      ReadObject(text, child, depth + 1, object);
-    } else if (IsIn(kValueTags, tag)) {
-      ReadValue(text, child, object);
-    } else if (tag == "default" && depth == 0) {
-      // What is given first counts.
-      defaults_.emplace(child.attribute("name").value(), AttributeOf(text, child, "value"));
-    } else if (tag == "include" && depth == 0) {
-      Include(text, child);
-    } else {
-      std::vector<std::string_view> known(kObjectTags.begin(), kObjectTags.end());
-      known.insert(known.end(), kValueTags.begin(), kValueTags.end());
-      const std::string_view closest = ClosestOf(tag, known);
-      Error(text, child,
-            closest.empty() ? "is not supported"
-                            : Concat("is unknown; did you mean <", closest, ">?"));
-    }
+    if (child.type() == pugi::node_element) ReadElement(text, child, depth, object);
   }
 }
 
-void DocumentReader::ReadText(const std::string& path, std::string_view bytes) {
+void DocumentReader::ReadElement(const Text& text, const pugi::xml_node& node, int depth,
+                                 MitsubaObject& object) {
+  const std::string_view tag = node.name();
+  if (IsIn(kObjectTags, tag) || (tag == "spectrum" && !node.attribute("type").empty())) {
+    ReadObject(text, node, depth + 1, object);
+  } else if (IsIn(kValueTags, tag)) {
+    ReadValue(text, node, object);
+  } else if (tag == "default") {
+    // What is given first counts.
+    defaults_.emplace(node.attribute("name").value(), AttributeOf(text, node, "value"));
+  } else if (tag == "include") {
+    Include(text, node, depth, object);
+  } else if (tag == "path") {
+    if (depth > 0) Error(text, node, "must not be in an object");
+    if (const Status added = assets_.AddFolder(AttributeOf(text, node, "value")); !added.ok())
+      Error(text, node, std::string(added.message()));
+  } else if (tag == "alias") {
+    aliases_.push_back(
+        {AttributeOf(text, node, "id"), AttributeOf(text, node, "as"), text.LocationOf(node)});
+  } else {
+    std::vector<std::string_view> known(kObjectTags.begin(), kObjectTags.end());
+    known.insert(known.end(), kValueTags.begin(), kValueTags.end());
+    const std::string_view closest = ClosestOf(tag, known);
+    Error(
+        text, node,
+        closest.empty() ? "is not supported" : Concat("is unknown; did you mean <", closest, ">?"));
+  }
+}
+
+void DocumentReader::ReadText(const std::string& path, std::string_view bytes, int depth,
+                              MitsubaObject& object) {
   const Text text = TextOf(diagnostics_.NameOfFile(path), bytes);
   pugi::xml_document xml;
   const pugi::xml_parse_result parsed =
@@ -409,37 +480,85 @@ void DocumentReader::ReadText(const std::string& path, std::string_view bytes) {
     return;
   }
   const pugi::xml_node root = xml.document_element();
-  if (std::string_view(root.name()) != "scene") {
-    diagnostics_.Error({text.name, 0, 0},
-                       Concat("a Mitsuba scene begins with <scene>, not with <", root.name(), ">"));
-    return;
-  }
+  const bool is_scene = std::string_view(root.name()) == "scene";
   if (open_texts_.empty()) {
-    document_.scene.tag = "scene";
-    document_.scene.location = text.LocationOf(root);
-    document_.is_old = std::string_view(root.attribute("version").value()).starts_with("0.");
+    if (!is_scene) {
+      diagnostics_.Error(
+          {text.name, 0, 0},
+          Concat("a Mitsuba scene begins with <scene>, not with <", root.name(), ">"));
+      return;
+    }
+    object.tag = "scene";
+    object.location = text.LocationOf(root);
+    document_.version = VersionOf(root.attribute("version").value());
   }
   open_texts_.push_back(path);
-  ReadInto(text, root, 0, document_.scene);
+  if (is_scene) {
+    ReadInto(text, root, depth, object);
+  } else {
+    ReadElement(text, root, depth, object);
+  }
   open_texts_.pop_back();
 }
 
-void AddIds(const MitsubaObject& object, Diagnostics& diagnostics,
-            std::map<std::string, const MitsubaObject*>& objects) {
+void DocumentReader::AddIds(const MitsubaObject& object) {
   if (object.tag == "ref") return;
-  if (!object.id.empty() && !objects.emplace(object.id, &object).second) {
-    diagnostics.Error(object.location, Concat("the id ", Quoted(object.id), " is given twice"));
-  }
+  if (!object.id.empty() && !document_.objects.emplace(object.id, &object).second)
+    diagnostics_.Error(object.location, Concat("the id ", Quoted(object.id), " is given twice"));
   for (const MitsubaObject& child : object.children)
-    AddIds(child, diagnostics, objects);
+    AddIds(child);
+}
+
+void DocumentReader::AddAliases() {
+  for (const Alias& alias : aliases_) {
+    const auto found = document_.objects.find(alias.of);
+    if (found == document_.objects.end()) {
+      diagnostics_.Error(alias.location,
+                         Concat("there is no object with the id ", Quoted(alias.of)));
+    } else if (!document_.objects.emplace(alias.name, found->second).second) {
+      diagnostics_.Error(alias.location, Concat("the id ", Quoted(alias.name), " is given twice"));
+    }
+  }
 }
 
 }  // namespace
 
+std::optional<std::vector<double>> ListedNumbers(std::string_view text) {
+  std::vector<double> numbers;
+  constexpr std::string_view kBetween = " \t\r\n,";
+  std::size_t at = 0;
+  while ((at = text.find_first_not_of(kBetween, at)) != std::string_view::npos) {
+    std::string_view word = text.substr(at, text.find_first_of(kBetween, at) - at);
+    at += word.size();
+    if (word.starts_with('+')) word.remove_prefix(1);
+    double value = 0;
+    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+    if (error == std::errc::result_out_of_range) {
+      value = 0;  // too small; what is too large has more than 38 digits or an exponent
+      if (word.find("e-") == std::string_view::npos && word.find("E-") == std::string_view::npos)
+        return std::nullopt;
+    } else if (error != std::errc()) {
+      return std::nullopt;
+    }
+    if (end != word.data() + word.size() || !(std::abs(value) <= 3.4e38)) return std::nullopt;
+    numbers.push_back(value);
+  }
+  return numbers;
+}
+
+void PartEqualWavelengths(std::vector<double>& pairs) {
+  constexpr double kStepNm = 1e-4;
+  double given = 0;
+  for (std::size_t i = 0; i < pairs.size(); i += 2) {
+    const bool is_equal = i > 0 && pairs[i] == given;
+    given = pairs[i];
+    if (is_equal) pairs[i] = pairs[i - 2] + kStepNm;
+  }
+}
+
 void ReadMitsubaDocument(const std::string& main_path, std::string_view text, AssetReader& assets,
                          Diagnostics& diagnostics, MitsubaDocument& document) {
-  DocumentReader(assets, diagnostics, document).ReadText(main_path, text);
-  AddIds(document.scene, diagnostics, document.objects);
+  DocumentReader(assets, diagnostics, document).Read(main_path, text);
 }
 
 }  // namespace lucerna

@@ -5,7 +5,9 @@
 // Values become parameters of the types that pbrt texts have, so that one class checks both.
 #pragma once
 
+#include <array>
 #include <map>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -17,12 +19,14 @@
 
 namespace lucerna {
 
-// An element that makes something, such as <bsdf type="diffuse">, or a reference to one.
+// An element that makes something, such as <bsdf type="diffuse">, or a reference to one. A
+// <spectrum> with a type is a texture, as in Mitsuba.
 struct MitsubaObject {
   std::string tag;  // "bsdf", "shape", "ref" and so on
   std::string type;
-  std::string id;    // of a reference: of what it refers to
-  std::string name;  // what it is to the object around it; may be empty
+  std::string id;      // of a reference: of what it refers to
+  std::string name;    // what it is to the object around it; may be empty
+  std::string called;  // the name as the text has it
   SourceLocation location;
   std::vector<Parameter> values;
   std::map<std::string, Transform> transforms;  // by name; affine
@@ -31,14 +35,25 @@ struct MitsubaObject {
 
 struct MitsubaDocument {
   MitsubaObject scene;
-  bool is_old = false;  // in the dialect of Mitsuba 0.5 and 0.6
+  std::array<int, 3> version = {3, 0, 0};
   // By their ids; they point into `scene`.
   std::map<std::string, const MitsubaObject*> objects;
+
+  // In the dialect of Mitsuba 0.5 and 0.6.
+  [[nodiscard]] bool is_old() const { return version[0] == 0; }
 
   MitsubaDocument() = default;
   MitsubaDocument(const MitsubaDocument&) = delete;  // would point into the other
   MitsubaDocument& operator=(const MitsubaDocument&) = delete;
 };
+
+// The numbers of a list that spaces and commas separate; absent when something else is in it, or a
+// number that single precision cannot hold.
+[[nodiscard]] std::optional<std::vector<double>> ListedNumbers(std::string_view text);
+
+// Moves a wavelength that is the same as the one before it, where a curve has a step, up by a
+// little. `pairs` of wavelength and value.
+void PartEqualWavelengths(std::vector<double>& pairs);
 
 // Reads a text and the files that it includes into `document`, which is empty. What is wrong is
 // reported, and left out.

@@ -1,59 +1,12 @@
 // Emitters that are no part of a shape.
 #include <algorithm>
-#include <cmath>
-#include <numbers>
 #include <utility>
 
 #include "render/base/text.h"
+#include "render/formats/environment_picture.h"
 #include "render/formats/mitsuba/translator.h"
-#include "render/formats/pbrt/shapes.h"
-#include "render/math/equal_area_square.h"
 
 namespace lucerna {
-namespace {
-
-// The equal-area square that shows what a picture in latitude and longitude does: its top is +y,
-// its middle -z, and from there it goes on to +x.
-Picture EqualAreaOf(const Picture& map) {
-  const double pixels = static_cast<double>(map.width) * map.height;
-  const int side = std::clamp(static_cast<int>(std::ceil(std::sqrt(pixels))), 8, 8192);
-  // Pixels near the poles are narrow: several places of each pixel are looked up.
-  constexpr int kPlaces = 4096;
-  const int parts = std::clamp(kPlaces / side, 2, 16);
-  Picture square;
-  square.width = square.height = side;
-  square.channels = 3;
-  square.linear.resize(static_cast<std::size_t>(side) * static_cast<std::size_t>(side) * 3);
-  const float step = 1 / static_cast<float>(side * parts);
-  for (int y = 0; y < side; ++y) {
-    for (int x = 0; x < side; ++x) {
-      Rgb sum;
-      for (int i = 0; i < parts * parts; ++i) {
-        const Vec2 place = {(static_cast<float>(x * parts + i % parts) + 0.5F) * step,
-                            (static_cast<float>(y * parts + i / parts) + 0.5F) * step};
-        const Vec3 d = EqualAreaDirection(place);
-        double u = std::atan2(static_cast<double>(d.x), static_cast<double>(-d.z)) /
-                   (2 * std::numbers::pi);
-        u -= std::floor(u);
-        const double v =
-            std::acos(std::clamp(static_cast<double>(d.y), -1.0, 1.0)) / std::numbers::pi;
-        sum += map.At(std::min(static_cast<int>(u * map.width), map.width - 1),
-                      std::min(static_cast<int>(v * map.height), map.height - 1));
-      }
-      sum *= 1 / static_cast<float>(parts * parts);
-      float* pixel = &square.linear[(static_cast<std::size_t>(y) * static_cast<std::size_t>(side) +
-                                     static_cast<std::size_t>(x)) *
-                                    3];
-      pixel[0] = sum.r;
-      pixel[1] = sum.g;
-      pixel[2] = sum.b;
-    }
-  }
-  return square;
-}
-
-}  // namespace
-
 void MitsubaTranslator::TranslateEnvironment(const MitsubaObject& emitter, ParameterList& list) {
   const std::optional<std::string> file = list.FindString("filename");
   if (!file.has_value()) {
@@ -67,22 +20,12 @@ void MitsubaTranslator::TranslateEnvironment(const MitsubaObject& emitter, Param
     list.Error("filename", Concat("cannot be read: ", map.status().message()));
     return;
   }
-  const StatusOr<ShapeAxes> axes = AxesOf(ToWorld(emitter));
-  if (!axes.ok()) {
-    list.Error("is stretched by its transform, which is not supported; scale all axes alike");
+  const StatusOr<InfiniteLight> light = EnvironmentLight(**map, scale, ToWorld(emitter));
+  if (!light.ok()) {
+    list.Error(std::string(light.status().message()));
     return;
   }
-  // Summed over all pixels in single precision.
-  if (!(scale * static_cast<double>((*map)->Largest()) < 1e20)) {
-    list.Error("is too bright for single precision");
-    return;
-  }
-  InfiniteLight light;
-  light.kind = InfiniteLight::Kind::kEnvironment;
-  light.radiance = Gray(static_cast<float>(scale));
-  light.axes = *axes;
-  light.map = std::make_shared<const Picture>(EqualAreaOf(**map));
-  reader_.scene().infinite_lights.push_back(std::move(light));
+  reader_.scene().infinite_lights.push_back(*light);
 }
 
 void MitsubaTranslator::TranslateEmitter(const MitsubaObject& emitter) {
@@ -117,6 +60,7 @@ void MitsubaTranslator::TranslateEmitter(const MitsubaObject& emitter) {
     const double beam_deg = list.Float("beam_width", cutoff_deg * 3 / 4, {0, 180});
     number("coneangle", cutoff_deg);
     number("conedeltaangle", std::max(0.0, cutoff_deg - beam_deg));
+    list.Ignore("texture");
     if (ChildOf(emitter, "texture") != nullptr)
       list.Error("with a texture is not supported; it would be a projection light");
     if (cutoff_deg > beam_deg)
@@ -160,9 +104,39 @@ void MitsubaTranslator::TranslateAreaEmitter(const MitsubaObject& emitter) {
   list.Ignore("sampling_weight");
   MadeDirective made = Directive("AreaLightSource", emitter);
   made.strings = {"diffuse"};
-  made.parameters = {MakeColor("L", FindLight(emitter, list, "radiance"), emitter.location)};
+  // A picture lies on the shape as those of its material do.
+  const MitsubaObject* picture = nullptr;
+  for (const MitsubaObject& child : emitter.children) {
+    const MitsubaObject* const resolved = child.name == "radiance" ? Resolve(child) : nullptr;
+    if (resolved != nullptr && resolved->tag == "texture" && resolved->type == "bitmap")
+      picture = resolved;
+  }
+  if (picture == nullptr) {
+    made.parameters = {MakeColor("L", FindLight(emitter, list, "radiance"), emitter.location)};
+    list.WarnOfUnread();
+    reader_.CarryOut(std::move(made));
+    return;
+  }
+  list.Ignore("radiance");
   list.WarnOfUnread();
+  ParameterList of_picture = ListOf(*picture);
+  MadeDirective bitmap;
+  for (const std::string_view name : {"raw", "gamma"}) {
+    if (of_picture.Has(name))
+      of_picture.Warning(name, "is ignored: bytes of pictures that shine are decoded as sRGB");
+  }
+  const Placement placement = TranslateBitmap(*picture, of_picture, bitmap);
+  of_picture.WarnOfUnread();
+  for (Parameter& parameter : bitmap.parameters) {
+    if (parameter.name == "filename") made.parameters.push_back(std::move(parameter));
+  }
+  std::vector<AreaLight>& lights = reader_.scene().area_lights;
+  const std::size_t lights_before = lights.size();
   reader_.CarryOut(std::move(made));
+  if (lights.size() == lights_before) return;  // there was an error, or the picture is black
+  lights.back().mapping = placement.mapping;
+  lights.back().wrap_u = placement.wrap_u;
+  lights.back().wrap_v = placement.wrap_v;
 }
 
 }  // namespace lucerna

@@ -1,4 +1,6 @@
 // Media: what is inside or outside of a shape, or around a sensor.
+#include <algorithm>
+
 #include "render/base/text.h"
 #include "render/formats/mitsuba/translator.h"
 
@@ -12,10 +14,18 @@ std::string MitsubaTranslator::MediumOf(const MitsubaObject& object, std::string
   return media_.emplace(medium, TranslateMedium(*medium)).first->second;
 }
 
+bool MitsubaTranslator::IsEven(const MitsubaObject& medium) const {
+  return std::ranges::all_of(medium.children, [this](const MitsubaObject& child) {
+    const MitsubaObject* part = FindResolved(child);
+    return part == nullptr || part->tag != "volume" || part->type == "constvolume";
+  });
+}
+
 std::string MitsubaTranslator::TranslateMedium(const MitsubaObject& medium) {
   ParameterList list = ListOf(medium);
-  if (medium.type != "homogeneous") {
-    list.Error("is not supported; there is homogeneous");
+  const bool is_even_grid = medium.type == "heterogeneous" && IsEven(medium);
+  if (medium.type != "homogeneous" && !is_even_grid) {
+    list.Error("is not supported; there is homogeneous, and heterogeneous of constvolume alone");
     return {};
   }
   if (list.Has("material")) {
@@ -28,13 +38,15 @@ std::string MitsubaTranslator::TranslateMedium(const MitsubaObject& medium) {
     absorption = FindColor(medium, list, "sigma_a", {});
     scattering = FindColor(medium, list, "sigma_s", {});
   } else {
-    const Rgb extinction = FindColor(medium, list, "sigma_t", Gray(1));
+    const char* density = list.Has("density") ? "density" : "sigma_t";
+    const Rgb extinction = FindColor(medium, list, density, Gray(1));
     const Rgb albedo = FindColor(medium, list, "albedo", Gray(0.75F));
     if (MaxChannel(albedo) > 1) list.Error("albedo", "must be at most 1");
     scattering = extinction * albedo;
     absorption = extinction * (Gray(1) - albedo);
   }
-  for (const std::string_view name : {"sample_emitters", "has_spectral_extinction", "strategy"})
+  for (const std::string_view name :
+       {"sample_emitters", "has_spectral_extinction", "strategy", "method"})
     list.Ignore(name);
   const std::string name = NewName(medium);
   MadeDirective made = Directive("MakeNamedMedium", medium);
@@ -53,7 +65,7 @@ std::string MitsubaTranslator::TranslateMedium(const MitsubaObject& medium) {
     of_phase.WarnOfUnread();
   }
   list.WarnOfUnread();
-  RefuseOthers(medium, {"phase"});
+  RefuseOthers(medium, {"phase", "volume"});
   reader_.CarryOut(std::move(made));
   return name;
 }

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstring>
 #include <map>
+#include <set>
 #include <string>
 #include <tuple>
 
@@ -127,11 +128,40 @@ Status CheckMesh(TriangleMesh& mesh) {
 
 }  // namespace
 
+std::vector<std::string> MaterialsOfObj(std::string_view bytes) {
+  std::set<std::string> names;
+  constexpr std::string_view kBegin = "usemtl";
+  for (std::size_t at = bytes.find(kBegin); at != std::string_view::npos;
+       at = bytes.find(kBegin, at)) {
+    const std::size_t line = bytes.find_last_of("\r\n", at);
+    const std::size_t begin = line == std::string_view::npos ? 0 : line + 1;
+    const bool begins_line =
+        bytes.substr(begin, at - begin).find_first_not_of(" \t") == std::string_view::npos;
+    at += kBegin.size();
+    const std::string_view rest = bytes.substr(at, bytes.find_first_of("\r\n", at) - at);
+    const std::vector<std::string_view> words = WordsOf(rest);
+    if (begins_line && !words.empty()) names.emplace(words.front());
+  }
+  return {names.begin(), names.end()};
+}
+
 StatusOr<TriangleMesh> ParseObj(std::string_view bytes) {
+  LUCERNA_ASSIGN_OR_RETURN(std::vector<TriangleMesh> parts, ParseObjParts(bytes, {}));
+  return std::move(parts.front());
+}
+
+StatusOr<std::vector<TriangleMesh>> ParseObjParts(std::string_view bytes,
+                                                  std::span<const std::string> materials) {
   tinyobj::ObjReaderConfig config;
   config.triangulate = true;
   tinyobj::ObjReader reader;
-  if (!reader.ParseFromString(std::string(bytes), "", config))
+  // The file of materials is not read: names are all that is asked for.
+  std::string text(bytes);
+  std::string names;
+  for (const std::string& material : materials)
+    names += Concat("newmtl ", material, "\n");
+  if (!materials.empty()) text.insert(0, "mtllib names\n");
+  if (!reader.ParseFromString(text, names, config))
     return absl::InvalidArgumentError(Concat("is no usable OBJ file: ", reader.Error()));
   const tinyobj::attrib_t& attributes = reader.GetAttrib();
   const auto has = [](const std::vector<tinyobj::real_t>& numbers, int index, std::size_t width) {
@@ -142,28 +172,39 @@ StatusOr<TriangleMesh> ParseObj(std::string_view bytes) {
     return static_cast<float>(numbers[static_cast<std::size_t>(index) * width + i]);
   };
   bool has_normals = true;
-  bool has_uvs = true;
+  bool has_uvs = false;
   for (const tinyobj::shape_t& shape : reader.GetShapes()) {
     for (const tinyobj::index_t& corner : shape.mesh.indices) {
       has_normals = has_normals && has(attributes.normals, corner.normal_index, 3);
-      has_uvs = has_uvs && has(attributes.texcoords, corner.texcoord_index, 2);
+      has_uvs = has_uvs || has(attributes.texcoords, corner.texcoord_index, 2);
     }
   }
-  TriangleMesh mesh;
-  std::map<ObjCorner, std::uint32_t> vertices;
+  std::vector<TriangleMesh> parts(1 + materials.size());
+  std::vector<std::map<ObjCorner, std::uint32_t>> vertices(parts.size());
+  const auto part_of = [&](int material) -> std::size_t {
+    if (material < 0 || static_cast<std::size_t>(material) >= reader.GetMaterials().size())
+      return 0;
+    const std::string& name = reader.GetMaterials()[static_cast<std::size_t>(material)].name;
+    const auto found = std::ranges::find(materials, name);
+    return found == materials.end() ? 0 : 1 + static_cast<std::size_t>(found - materials.begin());
+  };
   for (const tinyobj::shape_t& shape : reader.GetShapes()) {
     // Polygons are split; should one have been left whole, its corners would be taken for those of
     // triangles.
     for (const auto corners : shape.mesh.num_face_vertices) {
       if (corners != 3) return absl::InvalidArgumentError("has a face that cannot be split");
     }
-    for (const tinyobj::index_t& corner : shape.mesh.indices) {
+    for (std::size_t i = 0; i < shape.mesh.indices.size(); ++i) {
+      const tinyobj::index_t& corner = shape.mesh.indices[i];
+      const std::size_t part = materials.empty() ? 0 : part_of(shape.mesh.material_ids.at(i / 3));
+      TriangleMesh& mesh = parts[part];
       if (!has(attributes.vertices, corner.vertex_index, 3))
         return absl::InvalidArgumentError("has a face that refers to a vertex that is not there");
+      const bool has_uv = has(attributes.texcoords, corner.texcoord_index, 2);
       const ObjCorner key = {corner.vertex_index, has_normals ? corner.normal_index : -1,
-                             has_uvs ? corner.texcoord_index : -1};
+                             has_uv ? corner.texcoord_index : -1};
       const auto [vertex, is_new] =
-          vertices.try_emplace(key, static_cast<std::uint32_t>(mesh.positions.size()));
+          vertices[part].try_emplace(key, static_cast<std::uint32_t>(mesh.positions.size()));
       mesh.indices.push_back(vertex->second);
       if (!is_new) continue;
       const auto vec3 = [&](const std::vector<tinyobj::real_t>& numbers, int index) {
@@ -171,15 +212,21 @@ StatusOr<TriangleMesh> ParseObj(std::string_view bytes) {
       };
       mesh.positions.push_back(vec3(attributes.vertices, corner.vertex_index));
       if (has_normals) mesh.normals.push_back(vec3(attributes.normals, corner.normal_index));
-      if (has_uvs) {
+      if (has_uv) {
         mesh.uvs.push_back({at(attributes.texcoords, corner.texcoord_index, 2, 0),
                             at(attributes.texcoords, corner.texcoord_index, 2, 1)});
+      } else if (has_uvs) {
+        mesh.uvs.emplace_back();
       }
     }
   }
-  if (mesh.indices.empty()) return absl::InvalidArgumentError("has no faces");
-  LUCERNA_RETURN_IF_ERROR(CheckMesh(mesh));
-  return mesh;
+  bool is_empty = true;
+  for (TriangleMesh& mesh : parts) {
+    is_empty = is_empty && mesh.indices.empty();
+    LUCERNA_RETURN_IF_ERROR(CheckMesh(mesh));
+  }
+  if (is_empty) return absl::InvalidArgumentError("has no faces");
+  return parts;
 }
 
 StatusOr<TriangleMesh> ParseSerialized(std::string_view bytes, std::uint64_t index,
@@ -237,25 +284,26 @@ TriangleMesh UnitSquare() {
 }
 
 TriangleMesh UnitCube() {
+  // The directions in which u and v grow on each side, as in Mitsuba.
+  struct Side {
+    Vec3 normal, u, v;
+  };
+  constexpr std::array kSides = {
+      Side{{1, 0, 0}, {0, 1, 0}, {0, 0, -1}},  Side{{-1, 0, 0}, {0, 1, 0}, {0, 0, 1}},
+      Side{{0, 1, 0}, {-1, 0, 0}, {0, 0, -1}}, Side{{0, -1, 0}, {0, 0, 1}, {1, 0, 0}},
+      Side{{0, 0, 1}, {0, 1, 0}, {1, 0, 0}},   Side{{0, 0, -1}, {0, -1, 0}, {1, 0, 0}}};
   TriangleMesh mesh;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    for (const float side : {-1.0F, 1.0F}) {
-      const auto first = static_cast<std::uint32_t>(mesh.positions.size());
-      for (const auto& [u, v] :
-           {std::pair{-1.0F, -1.0F}, {1.0F, -1.0F}, {1.0F, 1.0F}, {-1.0F, 1.0F}}) {
-        std::array<float, 3> position{};
-        position[axis] = side;
-        position[(axis + 1) % 3] = side * u;
-        position[(axis + 2) % 3] = v;
-        mesh.positions.push_back({position[0], position[1], position[2]});
-        std::array<float, 3> normal{};
-        normal[axis] = side;
-        mesh.normals.push_back({normal[0], normal[1], normal[2]});
-        mesh.uvs.push_back({0.5F * (u + 1), 0.5F * (v + 1)});
-      }
-      for (const std::uint32_t corner : {0U, 1U, 2U, 0U, 2U, 3U})
-        mesh.indices.push_back(first + corner);
+  for (const Side& side : kSides) {
+    const auto first = static_cast<std::uint32_t>(mesh.positions.size());
+    for (const Vec2 uv : {Vec2{0, 0}, Vec2{1, 0}, Vec2{1, 1}, Vec2{0, 1}}) {
+      mesh.positions.push_back(side.normal + side.u * (2 * uv.x - 1) + side.v * (2 * uv.y - 1));
+      mesh.normals.push_back(side.normal);
+      mesh.uvs.push_back(uv);
     }
+    // Around the normal from u to v, or the other way.
+    const bool is_right_handed = Dot(Cross(side.u, side.v), side.normal) > 0;
+    for (const std::uint32_t corner : {0U, 1U, 2U, 0U, 2U, 3U})
+      mesh.indices.push_back(first + (is_right_handed ? corner : 3 - corner));
   }
   return mesh;
 }

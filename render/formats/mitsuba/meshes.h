@@ -1,7 +1,10 @@
 // Meshes of Mitsuba scenes.
 #pragma once
 
+#include <span>
+#include <string>
 #include <string_view>
+#include <vector>
 
 #include "render/base/status.h"
 #include "render/scene/scene.h"
@@ -9,9 +12,16 @@
 namespace lucerna {
 
 // All groups of a Wavefront OBJ file as one mesh; faces of more corners are split. Materials are
-// ignored. Texture coordinates are as in the file. What should be a number and is none counts as 0.
+// ignored. Texture coordinates are as in the file, and 0 where only other faces have some. What
+// should be a number and is none counts as 0.
 // Errors: INVALID_ARGUMENT with what is wrong.
 [[nodiscard]] StatusOr<TriangleMesh> ParseObj(std::string_view bytes);
+// The same in parts: faces of the materials of these names, in their order, after all other faces.
+// Parts may be empty; there is one more than names.
+[[nodiscard]] StatusOr<std::vector<TriangleMesh>> ParseObjParts(
+    std::string_view bytes, std::span<const std::string> materials);
+// The names of the materials that the faces of an OBJ file have, each once.
+[[nodiscard]] std::vector<std::string> MaterialsOfObj(std::string_view bytes);
 
 // The `index`th mesh of a file in Mitsuba's own "serialized" format.
 // Errors: INVALID_ARGUMENT with what is wrong, RESOURCE_EXHAUSTED for more than `max_size_bytes`.

@@ -1,5 +1,7 @@
 // Sensors, films, filters and integrators: what the view is and how it is rendered.
+#include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <numbers>
 #include <utility>
 
@@ -10,6 +12,12 @@ namespace lucerna {
 namespace {
 
 constexpr double kDegrees = 180 / std::numbers::pi;
+// Integrators that render what "path" does.
+constexpr std::string_view kOfAllPaths[] = {
+    "path",   "volpath",    "volpathmis", "volpath_simple", "prb", "prb_basic",
+    "bdpt",   "prbvolpath", "ptracer",    "photonmapper",   "ppm", "prb_projective",
+    "sppm",   "mlt",        "pssmlt",     "erpt",           "vpl", "particle",
+    "moment", "stokes",     "adaptive",   "irrcache"};
 
 // The full angle of the shorter side of an image, from that along `axis`.
 double FovOfShorterSide(double fov_deg, std::string_view axis, double width, double height) {
@@ -25,12 +33,10 @@ double FovOfShorterSide(double fov_deg, std::string_view axis, double width, dou
 
 // Of film that is 36 mm wide and 24 mm high, along its diagonal: "50mm".
 std::optional<double> FovOfFocalLength(std::string_view text) {
-  double length_mm = 0;
-  for (const char c : text.substr(0, text.find("mm"))) {
-    if (c < '0' || c > '9' || length_mm > 1e4) return std::nullopt;
-    length_mm = 10 * length_mm + (c - '0');
-  }
-  if (!(length_mm > 0)) return std::nullopt;
+  const auto numbers = ListedNumbers(text.substr(0, text.find("mm")));
+  if (!numbers.has_value() || numbers->size() != 1) return std::nullopt;
+  const double length_mm = numbers->front();
+  if (!(length_mm > 0) || length_mm > 1e4) return std::nullopt;
   return 2 * std::atan(std::hypot(36, 24) / 2 / length_mm) * kDegrees;
 }
 
@@ -124,8 +130,17 @@ void MitsubaTranslator::TranslateFilm(const MitsubaObject& sensor) {
 
   MadeDirective camera = Directive("Camera", sensor);
   ParameterList view = ListOf(sensor);
-  for (const std::string_view name : {"near_clip", "far_clip", "shutter_open", "shutter_close"})
+  for (const std::string_view name : {"shutter_open", "shutter_close"})
     view.Ignore(name);
+  const auto warn_unless = [&view](std::string_view name, double value, std::string_view message) {
+    const auto number = view.FindFloat(name);
+    // What is written in decimals may be rounded.
+    if (number.has_value() && std::abs(*number - value) > 1e-5 * value) view.Warning(name, message);
+  };
+  warn_unless("near_clip", 1e-2, "is ignored: what is near is seen too");
+  warn_unless("far_clip", 1e4, "is ignored: what is far is seen too");
+  for (const std::string_view name : {"principal_point_offset_x", "principal_point_offset_y"})
+    warn_unless(name, 0, "is ignored: the view is around the middle of the image");
   const bool is_orthographic = sensor.type == "orthographic";
   camera.strings = {is_orthographic ? "orthographic" : "perspective"};
   const auto add_number = [&](const char* name, double value) {
@@ -187,6 +202,10 @@ void MitsubaTranslator::TranslateFilm(const MitsubaObject& sensor) {
 void MitsubaTranslator::TranslateIntegrator(const MitsubaObject& integrator) {
   // Such as <integrator type="adaptive"> around another.
   if (const MitsubaObject* inner = ChildOf(integrator, "integrator")) {
+    if (integrator.type == "aov") {
+      diagnostics_.Warning(integrator.location,
+                           Concat(SubjectOf(integrator), ": its layers are not written"));
+    }
     TranslateIntegrator(*inner);
     return;
   }
@@ -200,7 +219,20 @@ void MitsubaTranslator::TranslateIntegrator(const MitsubaObject& integrator) {
   };
   const std::int64_t depth = list.FindInteger("max_depth", {-1, 1 << 30}).value_or(-1);
   // Mitsuba counts the segments of a path, pbrt its vertices between camera and light.
-  if (depth > 0) add("maxdepth", "integer", static_cast<double>(depth - 1));
+  constexpr std::int64_t kLeast = 2;
+  constexpr std::int64_t kMost = 10'001;
+  if (depth >= 0) {
+    const std::int64_t held = std::clamp(depth, kLeast, kMost);
+    if (held != depth) {
+      list.Warning("max_depth", Concat("is taken as ", held, ": it must be from ", kLeast, " to ",
+                                       kMost, ", or -1"));
+    }
+    add("maxdepth", "integer", static_cast<double>(held - 1));
+  }
+  if (std::ranges::find(kOfAllPaths, integrator.type) == std::end(kOfAllPaths))
+    list.Warning("", "is not what is rendered: light goes all ways, as with \"path\"");
+  if (list.Bool("hide_emitters", false))
+    list.Warning("hide_emitters", "is ignored: lights are seen");
   if (const double radius = list.Float("initial_radius", 0, kZeroOrMore); radius > 0)
     add("radius", "float", radius);
   reader_.CarryOut(std::move(made));
@@ -220,6 +252,11 @@ void MitsubaTranslator::TranslateView() {
     if (object.tag == "integrator") integrator = &object;
   }
   if (integrator != nullptr) TranslateIntegrator(*integrator);
+  // Mitsuba's paths may become as long as they like. Those that lose light end by roulette long
+  // before this; those between perfect mirrors and in clear glass must end too.
+  constexpr int kUnlimited = 1000;
+  IntegratorSettings& settings = reader_.scene().integrator;
+  if (!settings.max_depth.has_value()) settings.max_depth = kUnlimited;
   if (sensor == nullptr) return;  // FinishScene says so
   TranslateFilm(*sensor);
   if (const MitsubaObject* sampler = ChildOf(*sensor, "sampler")) {

@@ -1,4 +1,5 @@
 // Shapes, and groups of them that instances repeat.
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
@@ -7,6 +8,7 @@
 #include "render/base/text.h"
 #include "render/formats/mitsuba/meshes.h"
 #include "render/formats/mitsuba/translator.h"
+#include "render/formats/parametric_mesh.h"
 
 namespace lucerna {
 namespace {
@@ -33,60 +35,112 @@ std::optional<Transform> AlongAxis(Vec3 from, Vec3 to, double& length) {
          turn;
 }
 
+// Between Mitsuba's v and v = 1 - v.
+void TurnOver(TriangleMesh& mesh) {
+  for (Vec2& uv : mesh.uvs)
+    uv.y = 1 - uv.y;
+}
+
 }  // namespace
 
-std::optional<TriangleMesh> MitsubaTranslator::ReadMeshOf(const MitsubaObject& shape,
-                                                          ParameterList& list) {
+std::vector<std::string> MitsubaTranslator::MaterialsNamedIn(const MitsubaObject& shape) const {
+  std::vector<std::string> names;
+  if (!document_.is_old() || shape.type != "obj") return names;
+  for (const MitsubaObject& child : shape.children) {
+    const MitsubaObject* bsdf = FindResolved(child);
+    if (bsdf == nullptr || bsdf->tag != "bsdf" || child.called.empty()) continue;
+    if (std::ranges::find(names, child.called) == names.end()) names.push_back(child.called);
+  }
+  return names;
+}
+
+std::vector<TriangleMesh> MitsubaTranslator::ReadMeshesOf(const MitsubaObject& shape,
+                                                          ParameterList& list,
+                                                          std::span<const std::string> materials) {
   // Whether v = 0 is at the top of pictures, as Mitsuba's textures have it.
   bool is_from_top = true;
-  TriangleMesh mesh;
+  std::vector<TriangleMesh> meshes(1);
   if (shape.type == "rectangle") {
-    mesh = UnitSquare();
+    meshes[0] = UnitSquare();
   } else if (shape.type == "cube") {
-    mesh = UnitCube();
+    meshes[0] = UnitCube();
   } else {
     const std::optional<std::string> file = list.FindString("filename");
     const bool is_obj = shape.type == "obj";
     const bool is_flipped = list.Bool("flip_tex_coords", is_obj);
     const bool has_flat_faces = list.Bool("face_normals", false);
-    for (const std::string_view name : {"max_smooth_angle", "collapse", "srgb"})
+    for (const std::string_view name : {"max_smooth_angle", "collapse", "srgb", "load_materials"})
       list.Ignore(name);
     const std::int64_t index = list.FindInteger("shape_index", {0, 1 << 30}).value_or(0);
     if (!file.has_value()) {
       list.Error("needs <string name=\"filename\">");
-      return std::nullopt;
+      return {};
     }
-    StatusOr<TriangleMesh> read;
+    Status read;
+    const auto keep = [&](StatusOr<TriangleMesh> mesh) {
+      read = mesh.status();
+      if (mesh.ok()) meshes[0] = *std::move(mesh);
+    };
     if (shape.type == "ply") {
-      read = assets_.ReadMesh(*file);
+      PlyFaces faces;
+      keep(assets_.ReadMesh(*file, &faces));
+      WarnOfSkipped(faces, list);
     } else if (const StatusOr<std::string> bytes = assets_.ReadBytes(*file); bytes.ok()) {
-      read = is_obj ? ParseObj(*bytes)
-                    : ParseSerialized(*bytes, static_cast<std::uint64_t>(index),
-                                      assets_.limits().max_shape_bytes);
-      if (!read.ok()) {
-        read = absl::InvalidArgumentError(
-            Concat(Quoted(*file), " ", std::string(read.status().message())));
+      if (is_obj) {
+        StatusOr<std::vector<TriangleMesh>> parts = ParseObjParts(*bytes, materials);
+        read = parts.status();
+        if (parts.ok()) meshes = *std::move(parts);
+        WarnOfMaterials(shape, *bytes, materials);
+      } else {
+        keep(ParseSerialized(*bytes, static_cast<std::uint64_t>(index),
+                             assets_.limits().max_shape_bytes));
       }
+      if (!read.ok()) read = absl::InvalidArgumentError(Concat(Quoted(*file), " ", read.message()));
     } else {
       read = bytes.status();
     }
     if (!read.ok()) {
-      list.Error("filename", Concat("cannot be read: ", std::string(read.status().message())));
-      return std::nullopt;
+      list.Error("filename", Concat("cannot be read: ", read.message()));
+      return {};
     }
-    mesh = *std::move(read);
     is_from_top = !is_flipped;
-    if (has_flat_faces) {
-      mesh.normals.clear();
-    } else if (mesh.normals.empty()) {
-      ComputeNormals(mesh);
+    for (TriangleMesh& mesh : meshes) {
+      if (has_flat_faces) {
+        mesh.normals.clear();
+      } else if (mesh.normals.empty()) {
+        ComputeNormals(mesh);
+      }
     }
   }
   if (is_from_top) {
-    for (Vec2& uv : mesh.uvs)
-      uv.y = 1 - uv.y;
+    for (TriangleMesh& mesh : meshes)
+      TurnOver(mesh);
   }
-  return mesh;
+  return meshes;
+}
+
+void MitsubaTranslator::WarnOfMaterials(const MitsubaObject& shape, std::string_view obj,
+                                        std::span<const std::string> materials) {
+  if (!document_.is_old()) return;  // newer ones read no materials either
+  const std::vector<std::string> used = MaterialsOfObj(obj);
+  const bool has_all = std::ranges::all_of(used, [&](const std::string& name) {
+    return std::ranges::find(materials, name) != materials.end();
+  });
+  if (has_all || (used.size() == 1 && ChildOf(shape, "bsdf") != nullptr)) return;
+  diagnostics_.Warning(shape.location,
+                       Concat(SubjectOf(shape),
+                              " has materials of a file (mtllib), which is not read; give them as "
+                              "bsdfs that are named like them: ",
+                              Listed(used)));
+}
+
+void MitsubaTranslator::UseSurface(const Surface& surface, const MitsubaObject& shape,
+                                   MadeDirective& made) {
+  MadeDirective material = Directive("NamedMaterial", shape);
+  material.strings = {surface.material};
+  reader_.CarryOut(std::move(material));
+  std::erase_if(made.parameters, [](const Parameter& p) { return p.name == "alpha"; });
+  if (surface.alpha.has_value()) made.parameters.push_back(*surface.alpha);
 }
 
 void MitsubaTranslator::AddGeometry(const MitsubaObject& shape, ParameterList& list,
@@ -96,6 +150,16 @@ void MitsubaTranslator::AddGeometry(const MitsubaObject& shape, ParameterList& l
     made.parameters.push_back(MakeNumber(name, value, shape.location));
   };
   const std::string_view type = shape.type;
+  std::set<const MitsubaObject*> visited;
+  const MitsubaObject* bsdf = ChildOf(shape, "bsdf");
+  const MitsubaObject* emitter = ChildOf(shape, "emitter");
+  const bool has_texture = (bsdf != nullptr && HasTexture(*bsdf, visited)) ||
+                           (emitter != nullptr && HasTexture(*emitter, visited));
+  const auto add_mesh = [&](MadeDirective directive, TriangleMesh mesh) {
+    SetTransform(to_world, shape);
+    directive.strings = {"trianglemesh"};
+    reader_.AddMesh(std::move(directive), std::move(mesh));
+  };
   if (type == "sphere") {
     made.strings = {"sphere"};
     number("radius", list.Float("radius", 1, kAboveZero));
@@ -103,6 +167,15 @@ void MitsubaTranslator::AddGeometry(const MitsubaObject& shape, ParameterList& l
     to_world = to_world * Transform::Translate(static_cast<double>(center.x),
                                                static_cast<double>(center.y),
                                                static_cast<double>(center.z));
+  } else if (type == "disk" && has_texture) {
+    TriangleMesh mesh = DiskMesh(1, 0, 0, 2 * std::numbers::pi);
+    // From the angle and the distance from the rim to those of Mitsuba, whose u is the distance
+    // from the centre.
+    for (Vec2& uv : mesh.uvs)
+      uv = {1 - uv.y, uv.x};
+    TurnOver(mesh);
+    add_mesh(std::move(made), std::move(mesh));
+    return;
   } else if (type == "disk") {
     made.strings = {"disk"};
   } else if (type == "cylinder") {
@@ -115,17 +188,35 @@ void MitsubaTranslator::AddGeometry(const MitsubaObject& shape, ParameterList& l
       list.Error("has no length: p0 and p1 are the same");
       return;
     }
-    number("radius", list.Float("radius", 1, kAboveZero));
+    const double radius = list.Float("radius", 1, kAboveZero);
+    to_world = to_world * *along;
+    if (has_texture) {
+      TriangleMesh mesh = CylinderMesh(radius, 0, length, 2 * std::numbers::pi);
+      TurnOver(mesh);
+      add_mesh(std::move(made), std::move(mesh));
+      return;
+    }
+    number("radius", radius);
     number("zmin", 0);
     number("zmax", length);
-    to_world = to_world * *along;
   } else if (type == "rectangle" || type == "cube" || type == "obj" || type == "ply" ||
              type == "serialized") {
-    std::optional<TriangleMesh> mesh = ReadMeshOf(shape, list);
-    if (!mesh.has_value()) return;
-    SetTransform(to_world, shape);
-    made.strings = {"trianglemesh"};
-    reader_.AddMesh(std::move(made), *std::move(mesh));
+    const std::vector<std::string> materials = MaterialsNamedIn(shape);
+    std::vector<TriangleMesh> meshes = ReadMeshesOf(shape, list, materials);
+    for (std::size_t i = 0; i < meshes.size(); ++i) {
+      if (meshes[i].indices.empty() && meshes.size() > 1) continue;
+      MadeDirective part = made;
+      if (i > 0) {
+        const auto named = std::ranges::find_if(shape.children, [&](const MitsubaObject& child) {
+          const MitsubaObject* resolved = FindResolved(child);
+          return child.called == materials[i - 1] && resolved != nullptr && resolved->tag == "bsdf";
+        });
+        const std::optional<Surface> surface = SurfaceOf(*FindResolved(*named));
+        if (!surface.has_value()) return;
+        UseSurface(*surface, shape, part);
+      }
+      add_mesh(std::move(part), std::move(meshes[i]));
+    }
     return;
   } else {
     list.Error(
@@ -184,17 +275,12 @@ void MitsubaTranslator::TranslateShape(const MitsubaObject& shape) {
   ParameterList list = ListOf(shape);
   MadeDirective made = Directive("Shape", shape);
   reader_.CarryOut(Directive("AttributeBegin", shape));
-  if (const MitsubaObject* bsdf = ChildOf(shape, "bsdf")) {
-    if (const std::optional<Surface> surface = SurfaceOf(*bsdf); surface.has_value()) {
-      MadeDirective material = Directive("NamedMaterial", shape);
-      material.strings = {surface->material};
-      reader_.CarryOut(std::move(material));
-      if (surface->alpha.has_value()) made.parameters.push_back(*surface->alpha);
-    }
-  }
   const std::string inside = MediumOf(shape, "interior");
   const std::string outside = MediumOf(shape, "exterior");
-  if (!inside.empty() || !outside.empty()) {
+  const bool has_media = !inside.empty() || !outside.empty();
+  if (const auto surface = SurfaceOfShape(shape, has_media); surface.has_value())
+    UseSurface(*surface, shape, made);
+  if (has_media) {
     MadeDirective interface = Directive("MediumInterface", shape);
     interface.strings = {inside, outside};
     reader_.CarryOut(std::move(interface));

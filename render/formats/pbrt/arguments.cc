@@ -155,14 +155,7 @@ bool Arguments::ReadValue(Parameter& parameter, bool is_known_type) {
     const bool is_value = token.kind == Token::Kind::kWord || token.kind == Token::Kind::kString;
     if (!is_value || IsDirective(token.text)) return false;
     tokens_->Next();
-    // It is counted as a value, so that its absence is not a second error.
-    if (parameter.type == "bool") {
-      parameter.bools.push_back(false);
-    } else if (IsNumeric(parameter.type)) {
-      parameter.numbers.push_back(0);
-    } else {
-      parameter.strings.emplace_back();
-    }
+    parameter.is_unreadable = true;
     return true;
   };
   if (!is_known_type) {

@@ -10,6 +10,7 @@
 #include "render/base/text.h"
 #include "render/formats/pbrt/rgb_space.h"
 #include "render/formats/pbrt/spectrum_files.h"
+#include "render/scene/shape_lists.h"
 
 namespace lucerna {
 namespace {
@@ -88,6 +89,9 @@ bool IsDirective(std::string_view word) {
 UnfinishedScene DirectiveReader::Read(const std::string& main_path, std::string_view text) {
   ++texts_read_;
   ReadText(main_path, text, nullptr);
+  unfinished_.without_camera =
+      "the scene has no Camera: as by pbrt-v4 it is seen from the origin along +z, with a field of "
+      "view of 90 degrees";
   return Finish();
 }
 
@@ -267,10 +271,26 @@ void DirectiveReader::ReportNamedMaterials() {
 }
 
 void DirectiveReader::ReportNamedMedia() {
+  std::vector<bool> is_used(scene_.media.size(), false);
+  const auto use = [&](std::int32_t medium) {
+    if (medium != kNoMedium) is_used[static_cast<std::size_t>(medium)] = true;
+  };
+  use(scene_.camera.medium);
+  ForEachDeltaList(scene_, [&](const auto& lights) {
+    for (const auto& light : lights)
+      use(light.medium);
+  });
+  ForEachShapeTraits(scene_, [&](const ShapeTraits& traits) {
+    use(traits.medium_inside);
+    use(traits.medium_outside);
+  });
   for (const auto& [name, medium] : named_media_) {
-    if (!medium.is_defined) {
-      diagnostics_.Error(medium.location, Concat("there is no medium ", Quoted(name),
-                                                 "; define it by MakeNamedMedium"));
+    if (medium.is_defined) continue;
+    const std::string message = Concat("there is no medium ", Quoted(name));
+    if (is_used[static_cast<std::size_t>(medium.index)]) {
+      diagnostics_.Error(medium.location, Concat(message, "; define it by MakeNamedMedium"));
+    } else {
+      diagnostics_.Warning(medium.location, Concat(message, "; nothing is in it"));
     }
   }
 }
@@ -312,13 +332,23 @@ bool DirectiveReader::End(Arguments& arguments, std::string_view begun_by) {
   return ended.ok();
 }
 
+void DirectiveReader::EndAttributes(Arguments& arguments, std::string_view begun_by) {
+  const std::vector<GraphicsStack::Scope>& open = graphics_.open_scopes();
+  if (!open.empty() && open.back().begun_by != "Import") {
+    End(arguments, begun_by);
+    return;
+  }
+  diagnostics_.Warning(arguments.location(), Concat(arguments.directive(), " without ", begun_by,
+                                                    " is ignored, as by pbrt-v4"));
+}
+
 bool DirectiveReader::OnAttributeBegin(Arguments& arguments) {
   Begin(arguments);
   return true;
 }
 
 bool DirectiveReader::OnAttributeEnd(Arguments& arguments) {
-  End(arguments, "AttributeBegin");
+  EndAttributes(arguments, "AttributeBegin");
   return true;
 }
 
@@ -329,7 +359,7 @@ bool DirectiveReader::OnTransformBegin(Arguments& arguments) {
 }
 
 bool DirectiveReader::OnTransformEnd(Arguments& arguments) {
-  End(arguments, "TransformBegin");
+  EndAttributes(arguments, "TransformBegin");
   return true;
 }
 

@@ -119,6 +119,8 @@ class DirectiveReader {
   // Scopes (directives.cc).
   void Begin(Arguments& arguments);
   bool End(Arguments& arguments, std::string_view begun_by);
+  // The same; with a warning where nothing has begun within this file.
+  void EndAttributes(Arguments& arguments, std::string_view begun_by);
   bool OnAttributeBegin(Arguments& arguments);
   bool OnAttributeEnd(Arguments& arguments);
   bool OnTransformBegin(Arguments& arguments);
@@ -140,6 +142,8 @@ class DirectiveReader {
     bool is_defined = false;
     bool is_used = false;
   };
+  // Whether it is another one at each place of a surface, or not defined yet.
+  [[nodiscard]] bool MayDependOnPlace(std::int32_t material) const;
   NamedMaterial& Named(const std::string& name, const SourceLocation& location);
   MaterialSources MaterialSourcesHere();
   struct NamedMedium {

@@ -77,7 +77,8 @@ std::optional<Portal> ReadPortal(ParameterList& parameters) {
 // luminance 1: its curve has the unit of the file, and a black body is 1 at its peak.
 double LuminanceInPicture(ParameterList& parameters, const GivenSpectrum& spectrum) {
   const Parameter* const emission = parameters.FindWhole("L");
-  if (emission == nullptr || !spectrum.is_given()) return 1;
+  // Those with a name have luminance 1.
+  if (emission == nullptr || !spectrum.is_given() || !emission->strings.empty()) return 1;
   const double luminance = LuminanceOf(*spectrum.curve);
   return emission->type == "blackbody" ? luminance / BlackbodyPeak(emission->numbers[0])
                                        : luminance;
@@ -138,7 +139,7 @@ void ReadInfiniteLight(const LightInput& input) {
   const std::optional<Portal> portal = ReadPortal(parameters);
   double scale = parameters.Float("scale", 1, kZeroOrMore);
   const double illuminance = parameters.Float("illuminance", -1);
-  if (parameters.Has("filename")) {
+  if (parameters.HasText("filename")) {
     ReadEnvironment(input, scale, illuminance, portal);
     return;
   }

@@ -32,7 +32,7 @@ AreaEmission ReadDiffuseEmission(ParameterList& parameters, AssetReader& assets)
   AreaEmission emission;
   Rgb color = Gray(1);
   double largest = 1;
-  if (parameters.Has("filename")) {
+  if (parameters.HasText("filename")) {
     if (parameters.Has("L")) {
       parameters.Error("L", "and filename exclude each other; give one or the other");
       parameters.Ignore("L");
@@ -91,11 +91,12 @@ Vec3 Direction(ParameterList& parameters, const Transform& to_world, Vec3 from, 
 }
 
 std::shared_ptr<const Picture> ReadLightPicture(ParameterList& parameters, AssetReader& assets) {
-  const std::optional<std::string> file = parameters.FindString("filename");
-  if (!file.has_value()) {
+  if (!parameters.HasText("filename")) {
     parameters.Error("needs \"string filename\": the picture that says how strong it is");
     return nullptr;
   }
+  const std::optional<std::string> file = parameters.FindString("filename");
+  if (!file.has_value()) return nullptr;
   StatusOr<std::shared_ptr<const Picture>> map = assets.ReadPicture(*file, {});
   if (!map.ok()) {
     parameters.Error("filename", Concat("cannot be read: ", map.status().message()));

@@ -59,6 +59,7 @@ void ReadCoefficients(float scale, const MaterialInput& input, Material& materia
     }
   } else if (parameters.Has("sigma_a") != parameters.Has("sigma_s")) {
     parameters.Error("sigma_a", "and sigma_s must be given together");
+    parameters.Ignore("sigma_s");
   } else {
     material.absorption = ConstantOf("sigma_a", material.absorption, kZeroOrMore, parameters);
     material.scattering = ConstantOf("sigma_s", material.scattering, kZeroOrMore, parameters);

@@ -48,9 +48,8 @@ void ReadBumps(const MaterialInput& input, Material& material) {
   const NamedTexture* heights = nullptr;
   if (parameters.IsTexture("displacement")) {
     heights = FindNumbers("displacement", parameters, input.from.declared.numbers);
-  } else if (parameters.Has("displacement")) {
-    parameters.Error("displacement", "must be a texture");
-    parameters.Ignore("displacement");
+  } else {
+    parameters.Ignore("displacement");  // the same everywhere is none
   }
   if (material.kind == Material::Kind::kMix || material.kind == Material::Kind::kInterface ||
       material.kind == Material::Kind::kHair) {

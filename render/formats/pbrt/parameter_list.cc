@@ -24,7 +24,7 @@ constexpr std::array<std::string_view, 2> kVector = {"vector3", "vector"};
 constexpr std::array<std::string_view, 2> kReflectanceTypes = {"rgb", "spectrum"};
 constexpr std::array<std::string_view, 3> kEmissionTypes = {"rgb", "spectrum", "blackbody"};
 constexpr std::array<std::string_view, 3> kOpticalTypes = {"spectrum", "rgb", "float"};
-constexpr std::array<std::string_view, 2> kIndexTypes = {"float", "spectrum"};
+constexpr std::array<std::string_view, 3> kIndexTypes = {"float", "spectrum", "rgb"};
 
 void Give(WavelengthCurve curve, GivenSpectrum* given) {
   if (given != nullptr) *given = {std::make_shared<const WavelengthCurve>(std::move(curve))};
@@ -110,7 +110,11 @@ const Parameter* ParameterList::Take(std::string_view name, std::span<const std:
   const Parameter* parameter = Find(name);
   if (parameter == nullptr) return nullptr;
   const bool is_first_time = MarkRead(*parameter);
-  if (std::find(types.begin(), types.end(), parameter->type) == types.end()) {
+  if (parameter->is_unreadable) return nullptr;
+  // Other formats than pbrt's take whole numbers for numbers.
+  const bool is_whole_float = !parameter->called.empty() && parameter->type == "integer" &&
+                              types.size() == 1 && types[0] == kFloat[0];
+  if (!is_whole_float && std::find(types.begin(), types.end(), parameter->type) == types.end()) {
     if (!is_first_time) return nullptr;
     const std::string wanted = Listed(types, " or ");
     if (parameter->type == "texture") {
@@ -125,6 +129,15 @@ const Parameter* ParameterList::Take(std::string_view name, std::span<const std:
   }
   if (count != 0 && !CheckCount(*parameter, count)) return nullptr;
   return parameter;
+}
+
+bool ParameterList::HasText(std::string_view name) {
+  const Parameter* parameter = Find(name);
+  if (parameter == nullptr) return false;
+  if (parameter->type != "string" || parameter->count() != 1 || !parameter->strings[0].empty())
+    return true;
+  MarkRead(*parameter);
+  return false;
 }
 
 const Parameter* ParameterList::FindWhole(std::string_view name) {
@@ -313,12 +326,22 @@ std::optional<Rgb> ParameterList::FindEmission(std::string_view name, GivenSpect
     return BlackbodyColor(parameter->numbers[0]);
   }
   if (!parameter->strings.empty()) {
-    if (parameter->strings.size() == 1 && parameter->strings[0] == "stdillum-D65") return Gray(1);
+    if (parameter->strings.size() == 1) {
+      // Of which the spectrum of grey is made.
+      if (parameter->strings[0] == "stdillum-D65") return Gray(1);
+      std::optional<WavelengthCurve> named = IlluminantNamed(parameter->strings[0]);
+      if (named.has_value()) {
+        const Rgb color = EmissionColor(*named);
+        Give(*std::move(named), given);
+        return color;
+      }
+    }
     diagnostics_.Error(
         parameter->location,
-        Concat(Called(*parameter), ": the named spectrum ", Quoted(parameter->strings[0]),
-               " is not supported for lights; there is stdillum-D65, or give ",
-               "an rgb, a blackbody or pairs of wavelength and value"));
+        Concat(
+            Called(*parameter), ": the named spectrum ", Quoted(parameter->strings[0]),
+            " is not supported for lights; there are stdillum-A, stdillum-D50, stdillum-D65 and ",
+            "illum-acesD60, or give an rgb, a blackbody or pairs of wavelength and value"));
     return std::nullopt;
   }
   std::optional<WavelengthCurve> curve = CurveOf(*parameter);
@@ -377,6 +400,17 @@ std::optional<RefractiveIndex> ParameterList::FindRefractiveIndex(std::string_vi
     if (!CheckRange(*parameter, parameter->numbers[0], range)) return std::nullopt;
     return RefractiveIndex{static_cast<float>(parameter->numbers[0]), {}};
   }
+  if (parameter->type == "rgb") {
+    if (!CheckCount(*parameter, 3)) return std::nullopt;
+    const std::vector<double>& rgb = parameter->numbers;
+    const double mean = (rgb[0] + rgb[1] + rgb[2]) / 3;
+    if (!CheckRange(*parameter, mean, range)) return std::nullopt;
+    if (rgb[0] != rgb[1] || rgb[1] != rgb[2]) {
+      diagnostics_.Warning(parameter->location, Concat(Called(*parameter), " is read as its mean, ",
+                                                       mean, "; for dispersion give a spectrum"));
+    }
+    return RefractiveIndex{static_cast<float>(mean), {}};
+  }
   if (!parameter->strings.empty()) {
     const std::optional<RefractiveIndex> glass = GlassNamed(parameter->strings[0]);
     if (parameter->strings.size() == 1 && glass.has_value()) return glass;
@@ -429,6 +463,7 @@ void ParameterList::Ignore(std::string_view name) {
 
 void ParameterList::Error(std::string_view name, std::string_view message) {
   const Parameter* parameter = Find(name);
+  if (parameter != nullptr) MarkRead(*parameter);
   diagnostics_.Error(parameter != nullptr ? parameter->location : location_,
                      Concat(parameter != nullptr ? Called(*parameter) : subject_, " ", message));
 }

@@ -30,6 +30,8 @@ struct Parameter {
   std::vector<double> numbers;  // numeric types and colours; finite, within single precision
   std::vector<std::string> strings;
   std::vector<bool> bools;
+  // A value could not be read, which was reported; the others may be anything.
+  bool is_unreadable = false;
   // Its rgb was given in other primaries; what Rec. 709 cannot show is to be clamped.
   bool is_converted = false;
 
@@ -58,6 +60,8 @@ class ParameterList {
                 const std::vector<Parameter>* defaults, Diagnostics& diagnostics);
 
   [[nodiscard]] bool Has(std::string_view name) const { return Find(name) != nullptr; }
+  // The same of a string that says nothing where it is empty, which counts as read.
+  [[nodiscard]] bool HasText(std::string_view name);
 
   std::optional<double> FindFloat(std::string_view name, Range range = kAnyNumber);
   double Float(std::string_view name, double otherwise, Range range = kAnyNumber);
@@ -87,7 +91,7 @@ class ParameterList {
   // An optical constant per channel: a colour, a number, a named metal or a curve.
   std::optional<Rgb> FindOpticalConstant(std::string_view name, Range range,
                                          GivenSpectrum* given = nullptr);
-  // An index of refraction: a number, a named glass or a curve.
+  // An index of refraction: a number, a named glass, a curve, or a colour, of which it is the mean.
   std::optional<RefractiveIndex> FindRefractiveIndex(std::string_view name, Range range);
   // The same at the d line, 1.5 when it is absent, with a warning where it is not the same at all
   // wavelengths.
@@ -101,7 +105,8 @@ class ParameterList {
   // Warns that a known parameter has no effect here.
   void Ignore(std::string_view name);
 
-  // Report about a parameter, or about the thing itself when the parameter is absent.
+  // Report about a parameter, or about the thing itself when the parameter is absent. One with an
+  // error counts as read.
   void Error(std::string_view name, std::string_view message);
   void Warning(std::string_view name, std::string_view message);
   void Error(std::string_view message) { Error("", message); }

@@ -5,14 +5,11 @@
 #include <cmath>
 
 #include "render/base/text.h"
+#include "render/formats/wavelength_color.h"
 #include "render/math/color_matching.h"
 #include "render/math/color_space.h"
 
 namespace lucerna {
-
-struct Chromaticity {
-  double x, y;
-};
 
 struct RgbSpace {
   std::string_view name;
@@ -85,26 +82,21 @@ ColorMatrix Adapted(Chromaticity from, Chromaticity to) {
   return Product(Inverse(kCones), scaled);
 }
 
-// Of daylight: CIE 15:2018, section 4.1.2.
+// Of daylight, below 4000 K of a black body.
 Chromaticity WhiteAt(double temperature_k) {
-  // Since the series was measured, the constant of Planck's law has changed.
+  // As pbrt-v4 has it: both by the constant of Planck's law of today.
   const double t = temperature_k * 1.4388 / 1.4380;
-  if (t < 4000) {
-    Column sum{};
-    for (double nm = kFirstObservedNm; nm <= kLastObservedNm; ++nm) {
-      const Xyz seen = CieObserver(nm);
-      // Planck's law, up to a factor.
-      const double power = 1 / (std::pow(nm * 1e-3, 5) * std::expm1(1.4388e7 / (nm * t)));
-      for (std::size_t c = 0; c < 3; ++c)
-        sum[c] += power * seen[c];
-    }
-    const double all = sum[0] + sum[1] + sum[2];
-    return {sum[0] / all, sum[1] / all};
+  if (t >= 4000) return DaylightChromaticity(temperature_k);
+  Column sum{};
+  for (double nm = kFirstObservedNm; nm <= kLastObservedNm; ++nm) {
+    const Xyz seen = CieObserver(nm);
+    // Planck's law, up to a factor.
+    const double power = 1 / (std::pow(nm * 1e-3, 5) * std::expm1(1.4388e7 / (nm * t)));
+    for (std::size_t c = 0; c < 3; ++c)
+      sum[c] += power * seen[c];
   }
-  const double x = t <= 7000
-                       ? -4.6070e9 / (t * t * t) + 2.9678e6 / (t * t) + 0.09911e3 / t + 0.244063
-                       : -2.0064e9 / (t * t * t) + 1.9018e6 / (t * t) + 0.24748e3 / t + 0.237040;
-  return {x, -3 * x * x + 2.870 * x - 0.275};
+  const double all = sum[0] + sum[1] + sum[2];
+  return {sum[0] / all, sum[1] / all};
 }
 
 }  // namespace

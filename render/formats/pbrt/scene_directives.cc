@@ -126,7 +126,9 @@ bool DirectiveReader::OnColorSpace(Arguments& arguments) {
   if (!arguments.ReadString("a name", name)) return false;
   const RgbSpace* const space = FindRgbSpace(name);
   if (space == nullptr) {
-    arguments.Error(Concat("there is no colour space ", Quoted(name), "; ", RgbSpaceNames()));
+    diagnostics_.Warning(arguments.location(),
+                         Concat("there is no colour space ", Quoted(name),
+                                ", ColorSpace is ignored; ", RgbSpaceNames()));
     return true;
   }
   graphics_.state().rgb_space = space;
@@ -134,8 +136,13 @@ bool DirectiveReader::OnColorSpace(Arguments& arguments) {
 }
 
 bool DirectiveReader::OnOption(Arguments& arguments) {
-  const auto ignore = [&](const SourceLocation& location, std::string_view name) {
-    diagnostics_.Note(location, Concat("Option ", Quoted(name), " is ignored"));
+  const auto ignore = [&](const SourceLocation& location, std::string_view name, bool is_true) {
+    std::string message = Concat("Option ", Quoted(name), " is ignored");
+    if (name == "forcediffuse" && is_true) {
+      diagnostics_.Warning(location, Concat(message, ": materials are as the file has them"));
+    } else {
+      diagnostics_.Note(location, std::move(message));
+    }
   };
   // pbrt-v4 writes a name and a value; some files have parameters with a type.
   const Token& first = arguments.tokens().Peek();
@@ -143,17 +150,18 @@ bool DirectiveReader::OnOption(Arguments& arguments) {
     const SourceLocation location = first.location;
     std::string name;
     if (!arguments.ReadString("a name", name)) return false;
-    if (arguments.tokens().Next().kind == Token::Kind::kEnd) {
+    const Token value = arguments.tokens().Next();
+    if (value.kind == Token::Kind::kEnd) {
       diagnostics_.Error(location, Concat("Option ", Quoted(name), " has no value"));
       return true;
     }
-    ignore(location, name);
+    ignore(location, name, value.text == "true");
     return true;
   }
   std::vector<Parameter> parameters;
   if (!arguments.ReadParameters(parameters)) return false;
   for (const Parameter& parameter : parameters)
-    ignore(parameter.location, parameter.name);
+    ignore(parameter.location, parameter.name, parameter.bools == std::vector<bool>{true});
   return true;
 }
 
@@ -182,6 +190,13 @@ DirectiveReader::NamedMaterial& DirectiveReader::Named(const std::string& name,
     scene_.materials.push_back(Material());
   }
   return material->second;
+}
+
+bool DirectiveReader::MayDependOnPlace(std::int32_t material) const {
+  const bool is_yet_to_come = std::ranges::any_of(named_materials_, [&](const auto& named) {
+    return named.second.index == material && !named.second.is_defined;
+  });
+  return is_yet_to_come || scene_.materials[static_cast<std::size_t>(material)].DependsOnPlace();
 }
 
 bool DirectiveReader::OnMakeNamedMaterial(Arguments& arguments) {
@@ -229,10 +244,11 @@ bool DirectiveReader::OnAreaLightSource(Arguments& arguments) {
   if (!arguments.ReadTyped(type, parameters)) return false;
   ParameterList list = ListFor(arguments, type, std::move(parameters),
                                graphics_.state().DefaultsOf(AttributeTarget::kLight));
-  const std::optional<AreaEmission> emission = ReadAreaEmission(type, list, assets_);
   GraphicsState& state = graphics_.state();
   state.area_light = kNoAreaLight;
   state.area_emission.reset();
+  if (type.empty()) return true;  // switches it off
+  const std::optional<AreaEmission> emission = ReadAreaEmission(type, list, assets_);
   if (!emission.has_value()) return true;
   if (IsBlack(emission->radiance)) {
     list.Warning("", "emits nothing, its L, picture or scale is 0: its shapes are no lights");
@@ -296,6 +312,8 @@ bool DirectiveReader::AddShape(Arguments& arguments, std::optional<TriangleMesh>
   }
   const bool is_light = emits && open_object_ == nullptr;
   placement.emits = is_light;
+  placement.may_show_uv =
+      MayDependOnPlace(state.material) || (is_light && state.area_emission->picture != nullptr);
   if (is_light) {
     WarnIfMoved(arguments, "shapes that emit do not move, and pbrt-v4 refuses them");
   } else {
@@ -321,8 +339,10 @@ bool DirectiveReader::AddShape(Arguments& arguments, std::optional<TriangleMesh>
     }
   }
   if (is_light && state.area_emission->power_w.has_value() && shapes.Cost() > 0) {
-    if (!shapes.meshes.empty() && shapes.meshes[0].indices.size() > 3) {
-      list.Warning("", "gets its power as a whole; pbrt-v4 gives it to each triangle");
+    if (shapes.parts > 1) {
+      const std::string_view part =
+          type == "bilinearmesh" ? "patch" : (type == "plymesh" ? "face" : "triangle");
+      list.Warning("", Concat("gets its power as a whole; pbrt-v4 gives it to each ", part));
     }
     const AreaLight light = MakeAreaLight(*state.area_emission, shapes.Area());
     if (!IsFinite(light.Largest())) list.Error("is too small for its power");

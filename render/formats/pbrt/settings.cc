@@ -112,6 +112,19 @@ constexpr Kind<FilterReader> kFilters[] = {
     {"mitchell", &ReadMitchell}, {"sinc", &ReadSinc},
 };
 
+// Of an integrator of pbrt-v4, where 0 is the light of lights alone, and below there is no end.
+int DepthOf(std::int64_t max_depth, ParameterList& parameters) {
+  constexpr int kEndless = 1000;
+  if (max_depth > 0) return static_cast<int>(max_depth);
+  if (max_depth == 0) {
+    parameters.Warning("maxdepth", "is 0 and is held at 1: surfaces show the light of lights");
+    return 1;
+  }
+  parameters.Warning("maxdepth",
+                     Concat("is ", max_depth, ", which has no end, and is held at ", kEndless));
+  return kEndless;
+}
+
 }  // namespace
 
 void ReadCamera(std::string_view type, ParameterList& parameters, Camera& camera,
@@ -187,6 +200,11 @@ void ReadFilm(std::string_view type, ParameterList& parameters, FilmSettings& fi
   }
   for (const std::string_view name : {"diagonal", "savefp16"})
     parameters.Ignore(name);
+  if (type == "gbuffer") parameters.Ignore("coordinatesystem");
+  if (type == "spectral") {
+    for (const std::string_view name : {"nbuckets", "lambdamin", "lambdamax"})
+      parameters.Ignore(name);
+  }
   parameters.WarnOfUnread();
 }
 
@@ -207,8 +225,9 @@ void ReadPixelFilter(std::string_view type, ParameterList& parameters, PixelFilt
 void ReadIntegrator(std::string_view type, ParameterList& parameters,
                     IntegratorSettings& integrator) {
   integrator.name = std::string(type);
-  const std::optional<std::int64_t> depth = parameters.FindInteger("maxdepth", {1, 10'000});
-  if (depth.has_value()) integrator.max_depth = static_cast<int>(*depth);
+  const std::optional<std::int64_t> depth =
+      parameters.FindInteger("maxdepth", {-2147483648.0, 10'000});
+  if (depth.has_value()) integrator.max_depth = DepthOf(*depth, parameters);
   Diagnostics& diagnostics = parameters.diagnostics();
   if (type != "sppm") {
     diagnostics.Note(parameters.location(),

@@ -149,7 +149,12 @@ TriangleMesh RibbonOf(const std::vector<Bezier>& segments, const std::vector<Dou
 void ReadCurvePiece(const ShapeInput& input, ShapeSet& shapes) {
   ParameterList& parameters = input.parameters;
   const ShapePlacement& placement = input.placement;
-  const std::string type = parameters.String("type", "flat");
+  std::string type = parameters.String("type", "flat");
+  if (type != "flat" && type != "cylinder" && type != "ribbon") {
+    parameters.Warning("type", Concat("must be flat, cylinder or ribbon, not ", Quoted(type),
+                                      "; it is read as cylinder, as by pbrt-v4"));
+    type = "cylinder";
+  }
   const double width = parameters.Float("width", 1, kZeroOrMore);
   const double from_width = parameters.Float("width0", width, kZeroOrMore);
   const double to_width = parameters.Float("width1", width, kZeroOrMore);
@@ -189,10 +194,6 @@ void ReadCurvePiece(const ShapeInput& input, ShapeSet& shapes) {
       return;
     }
     PlaceMesh(RibbonOf(segments, normals, from_width, to_width), parameters, placement, shapes);
-    return;
-  }
-  if (type != "flat" && type != "cylinder") {
-    parameters.Error("type", Concat("must be flat, cylinder or ribbon, not ", Quoted(type)));
     return;
   }
   if (placement.traits.area_light != kNoAreaLight || placement.emits) {

@@ -28,7 +28,10 @@ void ReadBilinearMesh(const ShapeInput& input, ShapeSet& shapes) {
   for (const std::string_view name : {"faceIndices", "emissionfilename"})
     parameters.Ignore(name);
   const bool has_positions = ReadPositions(parameters, 4, control);
-  if (!ReadNormals(parameters, control) || !ReadUvs(parameters, control) || !has_positions) return;
+  ReadNormals(parameters, control);
+  ReadUvs(parameters, control);
+  if (!has_positions) return;
+  shapes.parts = control.indices.size() / 4;
   // Before they take the memory.
   constexpr std::uint64_t kBytesPerPatch = 16'384;
   if (control.indices.size() / 4 > input.assets.limits().max_shape_bytes / kBytesPerPatch) {
@@ -58,6 +61,7 @@ void ReadLoopSubdivision(const ShapeInput& input, ShapeSet& shapes) {
   parameters.Ignore("scheme");
   TriangleMesh control;
   if (!ReadPositions(parameters, 3, control)) return;
+  shapes.parts = control.indices.size() / 3;
   const double triangles = std::ldexp(static_cast<double>(control.indices.size()) / 3, 2 * levels);
   if (triangles > static_cast<double>(MostTriangles(input.assets))) {
     parameters.Error("levels", Concat("splits it into ", triangles,

@@ -49,14 +49,16 @@ void ReadLoopSubdivision(const ShapeInput& input, ShapeSet& shapes);
 void PlaceMesh(TriangleMesh mesh, ParameterList& parameters, const ShapePlacement& placement,
                ShapeSet& shapes);
 
-// Positions "P" and their "indices", `corners` a face, which may be absent for one face. False, and
-// reported, when they are wrong.
+// Positions "P" and their "indices", `corners` a face, which may be absent for one face. As in
+// pbrt-v4 those that make no whole face are left out, with a warning. False, and reported, when
+// they are wrong.
 [[nodiscard]] bool ReadPositions(ParameterList& parameters, std::uint32_t corners,
                                  TriangleMesh& mesh);
-// The optional "N", one for each position. False, and reported, when their number is wrong.
-[[nodiscard]] bool ReadNormals(ParameterList& parameters, TriangleMesh& mesh);
-// The optional "uv" or "st", one for each position.
-[[nodiscard]] bool ReadUvs(ParameterList& parameters, TriangleMesh& mesh);
+// The optional "N", one for each position. As in pbrt-v4 all are left out, with a warning, when
+// their number is wrong.
+void ReadNormals(ParameterList& parameters, TriangleMesh& mesh);
+// The same of the optional "uv" or "st".
+void ReadUvs(ParameterList& parameters, TriangleMesh& mesh);
 
 // True, with a note, when the transform leaves nothing of a shape with a volume, or of its extent.
 [[nodiscard]] bool IsFlattened(ParameterList& parameters, const Transform& to_world);

@@ -14,6 +14,7 @@
 #include "render/base/text.h"
 #include "render/formats/displaced_mesh.h"
 #include "render/formats/mesh_placement.h"
+#include "render/formats/parametric_mesh.h"
 #include "render/formats/pbrt/kinds.h"
 #include "render/formats/pbrt/shape_readers.h"
 #include "render/math/double3.h"
@@ -42,15 +43,19 @@ void ReadTriangleMesh(const ShapeInput& input, ShapeSet& shapes) {
   for (const std::string_view name : {"S", "faceIndices"})
     parameters.Ignore(name);
   const bool has_positions = ReadPositions(parameters, 3, mesh);
-  if (ReadNormals(parameters, mesh) && ReadUvs(parameters, mesh) && has_positions)
-    PlaceMesh(std::move(mesh), parameters, input.placement, shapes);
+  ReadNormals(parameters, mesh);
+  ReadUvs(parameters, mesh);
+  if (!has_positions) return;
+  shapes.parts = mesh.indices.size() / 3;
+  PlaceMesh(std::move(mesh), parameters, input.placement, shapes);
 }
 
 // False, and reported, where that cannot be done.
 bool DisplaceMesh(const ShapeInput& input, TriangleMesh& mesh) {
   ParameterList& parameters = input.parameters;
   const Transform& to_world = input.placement.to_world;
-  const double edge_length = parameters.Float("edgelength", 1, kAboveZero);
+  const double edge_length = parameters.Float(
+      "displacement.edgelength", parameters.Float("edgelength", 1, kAboveZero), kAboveZero);
   HeightOf height;
   if (parameters.IsTexture("displacement")) {
     const NamedTexture* texture = FindNumbers("displacement", parameters, input.textures.numbers);
@@ -77,6 +82,63 @@ bool DisplaceMesh(const ShapeInput& input, TriangleMesh& mesh) {
   return displaced.ok();
 }
 
+// Patches made of quadrangles, whose texture coordinates a mesh of triangles does not have.
+struct QuadPatches {
+  TriangleMesh flat, curved;
+};
+
+// Takes the quadrangles out of a mesh that need it: those that do not lie in a plane, and all where
+// texture coordinates are needed and the mesh has none. `most_triangles`: with more, all are flat,
+// with a warning.
+QuadPatches TakePatches(const std::vector<std::size_t>& quads, bool needs_uv,
+                        std::size_t most_triangles, ParameterList& parameters, TriangleMesh& mesh) {
+  const auto vertex_of = [&](std::size_t triangle, std::size_t corner) {
+    // Of p00, p10, p01 and p11: the corners of a face go around.
+    constexpr std::array<std::size_t, 4> kInTriangles = {0, 1, 5, 2};
+    return mesh.indices[3 * triangle + kInTriangles[corner]];
+  };
+  const auto patch_of = [&](std::size_t triangle) {
+    BilinearPatch patch;
+    for (std::size_t corner = 0; corner < 4; ++corner) {
+      const std::uint32_t vertex = vertex_of(triangle, corner);
+      patch.corners[corner] = mesh.positions[vertex];
+      if (!mesh.uvs.empty()) patch.uvs[corner] = mesh.uvs[vertex];
+    }
+    return patch;
+  };
+  std::vector<int> sides(quads.size());
+  std::size_t triangles = 0;
+  for (std::size_t i = 0; i < quads.size(); ++i) {
+    sides[i] = FewestPatchSides(patch_of(quads[i]));
+    triangles += 2 * static_cast<std::size_t>(sides[i]) * static_cast<std::size_t>(sides[i]);
+  }
+  if (triangles > most_triangles && triangles > 2 * quads.size()) {
+    parameters.Warning("filename", "has so many quadrangles that each is two flat triangles");
+    std::ranges::fill(sides, 1);
+  }
+  QuadPatches patches;
+  std::vector<bool> is_taken(mesh.indices.size() / 3, false);
+  for (std::size_t i = 0; i < quads.size(); ++i) {
+    // Flat ones share vertices as triangles, and only triangles have colours.
+    const bool is_done = sides[i] == 1 && (!mesh.uvs.empty() || !needs_uv);
+    if (is_done || !mesh.colors.empty()) continue;
+    std::array<Vec3, 4> normals;
+    for (std::size_t corner = 0; corner < 4 && !mesh.normals.empty(); ++corner)
+      normals[corner] = mesh.normals[vertex_of(quads[i], corner)];
+    AddBilinearPatch(patch_of(quads[i]), mesh.normals.empty() ? nullptr : &normals, sides[i],
+                     sides[i] == 1 ? patches.flat : patches.curved);
+    is_taken[quads[i]] = is_taken[quads[i] + 1] = true;
+  }
+  if (mesh.normals.empty()) patches.flat.normals.clear();
+  std::size_t kept = 0;
+  for (std::size_t triangle = 0; triangle < is_taken.size(); ++triangle) {
+    if (is_taken[triangle]) continue;
+    std::copy_n(&mesh.indices[3 * triangle], 3, &mesh.indices[3 * kept++]);
+  }
+  mesh.indices.resize(3 * kept);
+  return patches;
+}
+
 void ReadPlyMesh(const ShapeInput& input, ShapeSet& shapes) {
   ParameterList& parameters = input.parameters;
   const std::optional<std::string> file = parameters.FindString("filename");
@@ -84,17 +146,26 @@ void ReadPlyMesh(const ShapeInput& input, ShapeSet& shapes) {
     if (!parameters.Has("filename")) parameters.Error("needs \"string filename\"");
     return;
   }
-  StatusOr<TriangleMesh> mesh = input.assets.ReadMesh(*file);
+  PlyFaces faces;
+  StatusOr<TriangleMesh> mesh = input.assets.ReadMesh(*file, &faces);
   if (!mesh.ok()) {
     parameters.Error("filename", Concat("cannot be read: ", mesh.status().message()));
     return;
   }
-  if (!parameters.Has("displacement")) {
-    parameters.Ignore("edgelength");
-  } else if (!DisplaceMesh(input, *mesh)) {
-    return;
+  WarnOfSkipped(faces, parameters);
+  shapes.parts = mesh->indices.size() / 3 - faces.quads.size();
+  QuadPatches patches;
+  if (parameters.Has("displacement")) {
+    if (!DisplaceMesh(input, *mesh)) return;
+  } else {
+    for (const std::string_view name : {"edgelength", "displacement.edgelength"})
+      parameters.Ignore(name);
+    const bool needs_uv = input.placement.may_show_uv || parameters.IsTexture("alpha");
+    patches = TakePatches(faces.quads, needs_uv, MostTriangles(input.assets), parameters, *mesh);
   }
   PlaceMesh(*std::move(mesh), parameters, input.placement, shapes);
+  PlaceMesh(std::move(patches.flat), parameters, input.placement, shapes);
+  PlaceMesh(std::move(patches.curved), parameters, input.placement, shapes);
 }
 
 using ShapeReader = void (*)(const ShapeInput&, ShapeSet&);
@@ -107,8 +178,7 @@ constexpr Kind<ShapeReader> kKinds[] = {
 };
 #undef LUCERNA_ROW
 
-void ReadAlpha(ParameterList& parameters, const TextureNames& numbers, bool emits,
-               ShapeTraits& traits) {
+void ReadAlpha(ParameterList& parameters, const TextureNames& numbers, ShapeTraits& traits) {
   if (!parameters.IsTexture("alpha")) {
     traits.alpha = static_cast<float>(std::clamp(parameters.Float("alpha", 1), 0.0, 1.0));
     return;
@@ -117,17 +187,22 @@ void ReadAlpha(ParameterList& parameters, const TextureNames& numbers, bool emit
   if (alpha == nullptr) return;
   traits.alpha = std::clamp(alpha->largest, 0.0F, 1.0F);
   if (alpha->least >= 1 || alpha->largest <= 0) return;
-  if (emits) {
-    parameters.Error("alpha", "must not be a texture on a shape that emits");
-    return;
-  }
   traits.alpha_texture = alpha->number;
 }
 
 }  // namespace
 
+void WarnOfSkipped(const PlyFaces& faces, ParameterList& parameters) {
+  if (faces.skipped == 0) return;
+  parameters.Warning("filename",
+                     Concat("has ", faces.skipped, faces.skipped == 1 ? " face" : " faces",
+                            " with neither three nor four corners, left out"));
+}
+
 void PlaceMesh(TriangleMesh mesh, ParameterList& parameters, const ShapePlacement& placement,
                ShapeSet& shapes) {
+  // New vertices of a displaced mesh have none.
+  if (mesh.colors.size() != mesh.positions.size()) mesh.colors.clear();
   if (!MoveMesh(placement.to_world, mesh)) {
     parameters.Error("is moved out of the finite numbers by its transform");
     return;
@@ -151,7 +226,9 @@ void PlaceMesh(TriangleMesh mesh, ParameterList& parameters, const ShapePlacemen
 
 bool ReadPositions(ParameterList& parameters, std::uint32_t corners, TriangleMesh& mesh) {
   mesh.positions = Triples(parameters.Numbers("P", kPointTypes, 3));
-  const std::span<const double> indices = parameters.Numbers("indices", kIntegerType, corners);
+  const std::span<const double> given = parameters.Numbers("indices", kIntegerType, 1);
+  const std::size_t excess = given.size() % corners;
+  const std::span<const double> indices = given.first(given.size() - excess);
   if (mesh.positions.empty()) {
     if (!parameters.Has("P")) parameters.Error("needs vertex positions: \"point3 P\" [ ... ]");
     return false;
@@ -162,11 +239,16 @@ bool ReadPositions(ParameterList& parameters, std::uint32_t corners, TriangleMes
     return true;
   }
   if (indices.empty()) {
-    if (!parameters.Has("indices")) {
+    if (!parameters.Has("indices") || excess > 0) {
       parameters.Error(Concat("needs vertex indices, ", corners == 3 ? "three" : "four",
                               " for each ", corners == 3 ? "triangle" : "patch"));
     }
     return false;
+  }
+  if (excess > 0) {
+    parameters.Warning(
+        "indices", Concat("has ", given.size(), " values, no multiple of ", corners, ": the last ",
+                          excess, excess == 1 ? " is" : " are", " left out"));
   }
   for (const double index : indices) {
     if (!(index >= 0 && index < static_cast<double>(mesh.positions.size()))) {
@@ -179,28 +261,28 @@ bool ReadPositions(ParameterList& parameters, std::uint32_t corners, TriangleMes
   return true;
 }
 
-bool ReadNormals(ParameterList& parameters, TriangleMesh& mesh) {
+void ReadNormals(ParameterList& parameters, TriangleMesh& mesh) {
   mesh.normals = Triples(parameters.Numbers("N", kNormalTypes, 3));
-  if (mesh.normals.empty() || mesh.normals.size() == mesh.positions.size()) return true;
+  if (mesh.normals.empty() || mesh.normals.size() == mesh.positions.size()) return;
   if (!mesh.positions.empty()) {
-    parameters.Error("N", Concat("must have as many normals as P has vertices (",
-                                 mesh.positions.size(), "), not ", mesh.normals.size()));
+    parameters.Warning("N", Concat("has ", mesh.normals.size(), " normals for the ",
+                                   mesh.positions.size(), " vertices of P and is ignored"));
   }
-  return false;
+  mesh.normals.clear();
 }
 
-bool ReadUvs(ParameterList& parameters, TriangleMesh& mesh) {
+void ReadUvs(ParameterList& parameters, TriangleMesh& mesh) {
   const std::string_view name = parameters.Has("uv") ? "uv" : "st";
   const std::span<const double> uvs = parameters.Numbers(name, kPoint2Types, 2);
   for (std::size_t i = 0; i + 1 < uvs.size(); i += 2) {
     mesh.uvs.push_back({static_cast<float>(uvs[i]), static_cast<float>(uvs[i + 1])});
   }
-  if (mesh.uvs.empty() || mesh.uvs.size() == mesh.positions.size()) return true;
+  if (mesh.uvs.empty() || mesh.uvs.size() == mesh.positions.size()) return;
   if (!mesh.positions.empty()) {
-    parameters.Error(name, Concat("must have as many pairs as P has vertices (",
-                                  mesh.positions.size(), "), not ", mesh.uvs.size()));
+    parameters.Warning(name, Concat("has ", mesh.uvs.size(), " pairs for the ",
+                                    mesh.positions.size(), " vertices of P and is ignored"));
   }
-  return false;
+  mesh.uvs.clear();
 }
 
 std::size_t MostTriangles(const AssetReader& assets) {
@@ -269,7 +351,7 @@ ShapeSet ReadShapes(std::string_view type, ParameterList& parameters,
     return shapes;
   }
   ShapePlacement with_alpha = placement;
-  ReadAlpha(parameters, textures.numbers, placement.emits, with_alpha.traits);
+  ReadAlpha(parameters, textures.numbers, with_alpha.traits);
   read({parameters, with_alpha, assets, textures}, shapes);
   parameters.WarnOfUnread();
   return shapes;
@@ -279,7 +361,7 @@ ShapeSet PlaceMadeMesh(TriangleMesh mesh, ParameterList& parameters,
                        const ShapePlacement& placement, const TextureNames& numbers) {
   ShapeSet shapes;
   ShapePlacement with_alpha = placement;
-  ReadAlpha(parameters, numbers, placement.emits, with_alpha.traits);
+  ReadAlpha(parameters, numbers, with_alpha.traits);
   PlaceMesh(std::move(mesh), parameters, with_alpha, shapes);
   parameters.WarnOfUnread();
   return shapes;

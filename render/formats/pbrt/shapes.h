@@ -13,6 +13,7 @@
 #include "render/formats/asset_reader.h"
 #include "render/formats/pbrt/parameter_list.h"
 #include "render/formats/pbrt/textures.h"
+#include "render/formats/ply_file.h"
 #include "render/math/transform.h"
 #include "render/scene/scene.h"
 #include "render/scene/shape_moves.h"
@@ -26,6 +27,9 @@ struct ShapeSet {
 #define LUCERNA_MEMBER(Name, list, name) std::vector<Name> list;
   LUCERNA_ANALYTIC_SHAPES(LUCERNA_MEMBER)
 #undef LUCERNA_MEMBER
+
+  // Shapes of pbrt-v4 that these stand for, where they are triangles, patches or faces of a file.
+  std::uint64_t parts = 1;
 
   // What it costs to keep: triangles, every other shape as one, and vertices that no triangle
   // needs as a third of one.
@@ -41,6 +45,8 @@ struct ShapePlacement {
   bool reverse_orientation = false;
   ShapeTraits traits;
   bool emits = false;  // also where the light is made after the shape
+  // What is seen may depend on texture coordinates, besides by alpha.
+  bool may_show_uv = true;
   // Of shapes that move: at the end the transform scales all axes alike.
   bool stays_similar = true;
 };
@@ -58,6 +64,9 @@ struct ShapeTextures {
 // The same of a mesh that was read otherwise, with sound indices, in the shape's own space.
 [[nodiscard]] ShapeSet PlaceMadeMesh(TriangleMesh mesh, ParameterList& parameters,
                                      const ShapePlacement& placement, const TextureNames& numbers);
+
+// Warns of faces of a PLY file that were left out.
+void WarnOfSkipped(const PlyFaces& faces, ParameterList& parameters);
 
 // The shapes of an object where an instance of it stands; an ellipsoid, which has no kind of its
 // own, as a mesh, and where `stays_similar` is false what may become one. Errors: INVALID_ARGUMENT

@@ -20,10 +20,11 @@ StatusOr<std::vector<double>> ParseNumbers(std::string_view text) {
   const auto is_space = [](char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\n'; };
   while (i < text.size()) {
     if (text[i] == '#') {
-      while (i < text.size() && text[i] != '\n')
+      while (i < text.size() && text[i] != '\n' && text[i] != '\r')
         ++i;
     } else if (is_space(text[i])) {
-      if (text[i] == '\n') ++line;
+      const bool is_cr = text[i] == '\r' && (i + 1 == text.size() || text[i + 1] != '\n');
+      if (text[i] == '\n' || is_cr) ++line;
       ++i;
     } else {
       std::size_t end = i;

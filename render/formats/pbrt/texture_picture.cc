@@ -50,7 +50,7 @@ NamedTexture ReadPictureTexture(const TextureInput& input) {
   texture.is_inverted = parameters.Bool("invert", false);
   const PixelEncoding encoding = ReadEncoding(parameters);
   // Every pixel has many samples, over which a look-up between four pixels averages out.
-  parameters.Ignore("filter");
+  texture.is_nearest = parameters.String("filter", "bilinear") == "point";
   parameters.Ignore("maxanisotropy");
   const std::optional<std::string> file = parameters.FindString("filename");
   if (!file.has_value()) {

@@ -35,11 +35,13 @@ Token Tokenizer::Scan() {
   while (position_ < text_.size()) {
     const char c = text_[position_];
     if (c == '#') {
-      while (position_ < text_.size() && text_[position_] != '\n')
+      while (position_ < text_.size() && text_[position_] != '\n' && text_[position_] != '\r')
         ++position_;
     } else if (IsSpace(c)) {
       ++position_;
-      if (c == '\n') {
+      // A lone CR ends a line, too.
+      const bool is_cr = c == '\r' && (position_ == text_.size() || text_[position_] != '\n');
+      if (c == '\n' || is_cr) {
         ++line_;
         line_start_ = position_;
       }

@@ -129,7 +129,9 @@ bool DirectiveReader::OnCoordSysTransform(Arguments& arguments) {
   if (!arguments.ReadString("a name", name)) return false;
   const auto system = coordinate_systems_.find(name);
   if (system == coordinate_systems_.end()) {
-    arguments.Error(Concat("there is no coordinate system ", Quoted(name)));
+    diagnostics_.Warning(
+        arguments.location(),
+        Concat("there is no coordinate system ", Quoted(name), ": CoordSysTransform is ignored"));
     return true;
   }
   return Replace(arguments, system->second);

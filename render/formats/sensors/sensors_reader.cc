@@ -63,9 +63,6 @@ UnfinishedScene ReadSensors(const std::string& main_path, std::string_view text,
   if (scene_path.empty()) {
     return fail("its header does not name a scene; add a line \"comment lucerna scene FILE\"");
   }
-  if (scene_path == main_path || scene_path.ends_with(".ply")) {
-    return fail("the scene that it names must not be a PLY file itself");
-  }
   double spacing = 0;
   const std::string spacing_text = CommentAfter(points->comments, kSpacing);
   if (points->spacings.empty() &&
@@ -83,8 +80,8 @@ UnfinishedScene ReadSensors(const std::string& main_path, std::string_view text,
                        " points; give each point one, or none"));
   }
 
-  UnfinishedScene unfinished =
-      ReadUnfinishedScene(*diagnostics.NameOfFile(scene_path), assets, diagnostics);
+  UnfinishedScene unfinished = ReadUnfinishedScene(*diagnostics.NameOfFile(scene_path),
+                                                   SceneLayer::kView, assets, diagnostics);
   if (diagnostics.has_error()) return unfinished;
   Scene& scene = unfinished.scene;
   scene.sensors.resize(points->positions.size());
