@@ -104,10 +104,10 @@ bool LeavesTube(const std::vector<Shape>& shapes, const RTCRay& ray, float t, st
 
 // Where a ray meets a shape first, of its places those that its alpha leaves: through a hole in the
 // near wall of a ball the far one is met.
-template <typename Shape, std::vector<Shape> Scene::*kShapes>
-bool MeetsShape(const Scene& scene, const RTCRay& ray, std::uint32_t geometry, std::uint32_t index,
-                float& t) {
-  const Shape& shape = (scene.*kShapes)[index];
+template <typename Shape>
+bool MeetsShape(const Scene& scene, const std::vector<Shape>& shapes, const RTCRay& ray,
+                std::uint32_t geometry, std::uint32_t index, float& t) {
+  const Shape& shape = shapes[index];
   // A line meets no shape more often.
   constexpr std::uint32_t kMostPlaces = 4;
   float from = ray.tnear;
@@ -116,7 +116,7 @@ bool MeetsShape(const Scene& scene, const RTCRay& ray, std::uint32_t geometry, s
                         from, ray.tfar, t)) {
       return false;
     }
-    if (LeavesTube(scene.*kShapes, ray, t, index)) return false;
+    if (LeavesTube(shapes, ray, t, index)) return false;
     if (IsWhole(shape.traits) ||
         !PassesThroughShape(scene, shape, ray, t, geometry, index, met_before)) {
       return true;
@@ -133,7 +133,7 @@ void IntersectedShape(const RTCIntersectFunctionNArguments* arguments) {
   auto* ray_hit = reinterpret_cast<RTCRayHit*>(arguments->rayhit);
   RTCRay& ray = ray_hit->ray;
   float t = 0;
-  if (!MeetsShape<Shape, kShapes>(scene, ray, arguments->geomID, arguments->primID, t)) return;
+  if (!MeetsShape(scene, scene.*kShapes, ray, arguments->geomID, arguments->primID, t)) return;
   ray.tfar = t;
   ray_hit->hit.geomID = arguments->geomID;
   ray_hit->hit.primID = arguments->primID;
@@ -148,7 +148,7 @@ void OccludedByShape(const RTCOccludedFunctionNArguments* arguments) {
   const auto& scene = *static_cast<const Scene*>(arguments->geometryUserPtr);
   auto* ray = reinterpret_cast<RTCRay*>(arguments->ray);
   float t = 0;
-  if (MeetsShape<Shape, kShapes>(scene, *ray, arguments->geomID, arguments->primID, t))
+  if (MeetsShape(scene, scene.*kShapes, *ray, arguments->geomID, arguments->primID, t))
     ray->tfar = -HUGE_VALF;
 }
 
@@ -453,10 +453,16 @@ Hit Intersector::HitOn(std::uint32_t shape, const Ray& ray) const {
   }
   const TriangleMesh* mesh = MeshOf(scene_, hit.geometry);
   if (mesh == nullptr) {
-    // The function that Embree calls: the same bits.
-    VisitShape(scene_, KindOf(scene_, hit.geometry), hit.primitive, [&](const auto& s) {
-      return IntersectShape(s, ray.origin, ray.direction, 0, ray.t_max, hit.t);
-    });
+    // The function that Embree calls: the same bits, and of a shape with an alpha the same wall.
+    const RTCRay embree_ray = ToEmbree(ray);
+    switch (KindOf(scene_, hit.geometry)) {
+#define LUCERNA_CASE(Name, list, name)                                               \
+  case ShapeKind::k##Name:                                                           \
+    MeetsShape(scene_, scene_.list, embree_ray, hit.geometry, hit.primitive, hit.t); \
+    break;
+      LUCERNA_ANALYTIC_SHAPES(LUCERNA_CASE)
+#undef LUCERNA_CASE
+    }
   } else {
     const TriangleHit at = HitTriangle(CornersOf(scene_, *mesh, hit.primitive, hit.instance), ray);
     hit.t = at.t;

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Random rooms of all kinds of surfaces, for comparing the estimator with a path tracer.
 
-  tests/tools/make_material_scenes.py FOLDER FIRST LAST [--more [--uneven]]
+  tests/tools/make_material_scenes.py FOLDER FIRST LAST [--more [--uneven] [--masked]]
 
 Writes room-N.pbrt for the numbers FIRST to LAST. The same call writes the same bytes. Walls and
 objects have random materials with random parameters, textures, mixes and bumps; light comes from
@@ -11,7 +11,8 @@ them. No light below surfaces: the path tracer knows it on planes alone.
 With --more the rooms have media (fog in the room, in a part of it, inside glass), one to three
 lights of all kinds, curves, hair, instances, subdivision surfaces, parts of spheres and meshes with
 normals; picture.pfm is written beside them, for lights with pictures. With --uneven their media
-have random densities on grids, and everything else is the same.
+have random densities on grids, with --masked all lights that have a shape, and half of the spheres
+and boxes, have a random alpha, a number or a texture, and everything else is the same.
 """
 import argparse
 import math
@@ -33,6 +34,7 @@ class Room:
 
     def __init__(self, number):
         self.random = random.Random(number)
+        self.masks = None  # for alphas alone, so that everything else is the same with and without
         self.lines = []
         self.names = 0
 
@@ -179,6 +181,17 @@ class Room:
         self.write(f'AttributeBegin\nNamedMaterial "{black}"\n'
                    f'AreaLightSource "diffuse" "rgb L" {self.colour(3, 9)}\n{shape}\nAttributeEnd')
 
+    def mask(self, chance):
+        """An alpha for the next shape, whose texture is written already."""
+        if self.masks is None or self.masks.random() >= chance:
+            return ""
+        if self.masks.random() < 0.4:
+            return f' "float alpha" [{self.masks.uniform(0.2, 0.9):.2f}]'
+        self.random, self.masks = self.masks, self.random
+        texture = self.number_texture(-0.2, 1.2)
+        self.random, self.masks = self.masks, self.random
+        return f' "texture alpha" ["{texture}"]'
+
     def object(self):
         material = self.material(OBJECTS)
         radius = self.random.uniform(0.15, 0.35)
@@ -195,6 +208,7 @@ class Room:
             alpha = ""
             if self.random.random() < 0.15:
                 alpha = f' "float alpha" [{self.random.uniform(0.3, 0.9):.2f}]'
+            alpha = self.mask(0.5) or alpha
             self.write(f'Shape "sphere" "float radius" [{radius:.3f}]{alpha}')
         elif kind == "cylinder":
             half = f"{radius * 0.7:.3f}"
@@ -204,14 +218,15 @@ class Room:
             self.write(f'Shape "disk" "float radius" [{radius:.3f}] '
                        f'"float innerradius" [{radius * 0.3:.3f}]')
         else:
-            self.box("trianglemesh", radius * 0.55)
+            self.box("trianglemesh", radius * 0.55, self.mask(0.5))
         self.write("AttributeEnd")
 
-    def box(self, shape, half):
+    def box(self, shape, half, alpha=""):
         corners = [(x, y, z) for z in (-1, 1) for y in (-1, 1) for x in (-1, 1)]
         points = " ".join(f"{c * half:.3f}" for corner in corners for c in corner)
         self.write(f'Shape "{shape}" "point3 P" [{points}] "integer indices" '
-                   "[0 2 1 1 2 3 4 5 6 5 7 6 0 1 4 1 5 4 2 6 3 3 6 7 0 4 2 2 4 6 1 3 5 3 7 5]")
+                   "[0 2 1 1 2 3 4 5 6 5 7 6 0 1 4 1 5 4 2 6 3 3 6 7 0 4 2 2 4 6 1 3 5 3 7 5]"
+                   + alpha)
 
     def text(self):
         depth = self.random.choice([5, 8, 20])
@@ -246,8 +261,10 @@ class RoomWithMore(Room):
     widest_coat = 0.04
     hazy_coats = 0
 
-    def __init__(self, number, is_uneven=False):
+    def __init__(self, number, is_uneven=False, is_masked=False):
         super().__init__(number)
+        if is_masked:
+            self.masks = random.Random(number + 0.5)
         # For densities alone, so that everything else is the same with and without.
         self.uneven = random.Random(number) if is_uneven else None
         # A medium fills the room; the other one is in parts of it.
@@ -461,15 +478,16 @@ class RoomWithMore(Room):
         elif self.random.random() < 0.3:
             what = f'"blackbody L" [{self.random.uniform(2500, 9000):.0f}] "float power" [20]'
         sides = ' "bool twosided" [true]' if self.random.random() < 0.3 else ""
+        alpha = self.mask(1)
         self.write(f'NamedMaterial "{black}"\nAreaLightSource "diffuse" {what}{sides}')
         z = self.random.uniform(-.4, .4)
         if kind == "sphere":
-            self.write(f'Translate {x:.2f} 1.6 {z:.2f}\nShape "sphere" "float radius" [.15]')
+            self.write(f'Translate {x:.2f} 1.6 {z:.2f}\nShape "sphere" "float radius" [.15]{alpha}')
         else:
             turn = self.random.uniform(-30, 30)
             self.write(f"Translate {x:.2f} 1.7 {z:.2f}\nRotate {turn:.0f} 1 0 1\n"
                        'Shape "bilinearmesh" "point3 P" '
-                       "[-.2 0 .3  -.2 0 -.3  .2 0 .3  .2 0 -.3]")
+                       f"[-.2 0 .3  -.2 0 -.3  .2 0 .3  .2 0 -.3]{alpha}")
 
     def text(self):
         is_open = self.random.random() < 0.4
@@ -519,12 +537,15 @@ def main():
     parser.add_argument("last", type=int)
     parser.add_argument("--more", action="store_true")
     parser.add_argument("--uneven", action="store_true")
+    parser.add_argument("--masked", action="store_true")
     arguments = parser.parse_args()
     arguments.folder.mkdir(parents=True, exist_ok=True)
     if arguments.more:
         (arguments.folder / "picture.pfm").write_bytes(picture())
     for number in range(arguments.first, arguments.last + 1):
-        room = RoomWithMore(number, arguments.uneven) if arguments.more else Room(number)
+        room = Room(number)
+        if arguments.more:
+            room = RoomWithMore(number, arguments.uneven, arguments.masked)
         (arguments.folder / f"room-{number}.pbrt").write_text(room.text())
 
 
