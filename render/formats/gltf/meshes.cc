@@ -244,7 +244,7 @@ bool PrimitiveReader::ReadColors() {
     const auto held = [](double channel) {
       return channel > 0 ? static_cast<float>(std::min(channel, 1.0)) : 0.0F;
     };
-    mesh_.colors.emplace_back(held(color[0]), held(color[1]), held(color[2]));
+    mesh_.colors.push_back({held(color[0]), held(color[1]), held(color[2])});
   }
   return true;
 }
