@@ -765,12 +765,23 @@ class PathTracer {
     return seen;
   }
 
+  // Of a row or column of `count` that go on as `wrap` says; -1 where there is none.
+  static int Wrapped(double place, int count, Texture::Wrap wrap) {
+    const double period = wrap == Texture::Wrap::kMirror ? 2.0 * count : count;
+    const bool is_inside = place >= 0 && place < count;
+    if (wrap == Texture::Wrap::kBlack && !is_inside) return -1;
+    if (wrap == Texture::Wrap::kClamp || is_inside)
+      return static_cast<int>(std::clamp(place, 0.0, count - 1.0));
+    const double within = place - std::floor(place / period) * period;
+    return static_cast<int>(within < count ? within : period - 1 - within);
+  }
+
   // With a picture: between the centres of its pixels, the first row at v = 1.
   Color Emitted(const AreaLight& light, const SurfacePoint& point) const {
     const Color scale = Working(FromFloat(light.radiance));
     if (light.picture == nullptr) return scale;
     const Picture& picture = *light.picture;
-    const Vec2 uv = UvAt(scene_, point);
+    const Vec2 uv = light.mapping.Map({UvAt(scene_, point), {}, {}});
     const double x = static_cast<double>(uv.x) * picture.width - 0.5;
     const double y = (1 - static_cast<double>(uv.y)) * picture.height - 0.5;
     Color sum{};
@@ -778,11 +789,11 @@ class PathTracer {
       const double column = std::floor(x) + i % 2;
       const double row = std::floor(y) + i / 2;
       const double share = (1 - std::abs(x - column)) * (1 - std::abs(y - row));
-      const auto held = [](double place, int count) {
-        return std::clamp(static_cast<int>(place), 0, count - 1);
-      };
-      const Rgb pixel = picture.At(held(column, picture.width), held(row, picture.height));
-      AddTo(sum, Times(FromFloat(pixel), share));
+      // Rows grow downwards and v upwards, which is the same for each kind of wrapping.
+      const int at_u = Wrapped(column, picture.width, light.wrap_u);
+      const int at_v = Wrapped(row, picture.height, light.wrap_v);
+      if (at_u < 0 || at_v < 0) continue;
+      AddTo(sum, Times(FromFloat(picture.At(at_u, at_v)), share));
     }
     return Times(scale, Working(sum));
   }
