@@ -179,7 +179,10 @@ struct JobEstimator::State {
   double hit_share = 0;     // of the pixels that have one
 
   // The image as it is shown.
-  [[nodiscard]] WithoutBlur Shown() const { return {*sums, *controller, blur_noise_share}; }
+  [[nodiscard]] WithoutBlur Shown() const {
+    const bool media_scatter = std::ranges::any_of(prepared.scene().media, &Medium::Scatters);
+    return {*sums, *controller, blur_noise_share, media_scatter};
+  }
   [[nodiscard]] std::size_t pixels() const {
     return static_cast<std::size_t>(settings.crop_width()) *
            static_cast<std::size_t>(settings.crop_height());

@@ -27,13 +27,13 @@ constexpr double kLeft = 0.05;
 }  // namespace
 
 WithoutBlur::WithoutBlur(const ImageSums& sums, const RadiusController& controller,
-                         double noise_share)
+                         double noise_share, bool media_scatter)
     : sums_(sums),
       weight_(sums.weights().all()),
       passes_(static_cast<double>(sums.passes())),
       parts_(static_cast<double>(sums.parts())),
       noise_share_(noise_share) {
-  if (!controller.RemovesBlur() || parts_ < kFewestParts) return;
+  if (!controller.RemovesBlur() || media_scatter || parts_ < kFewestParts) return;
   // About Student's quantile.
   const double freedom = parts_ - 1;
   least_ = std::sqrt(freedom * std::expm1(kLeastTaken * kLeastTaken / freedom));

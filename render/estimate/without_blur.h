@@ -24,9 +24,12 @@ namespace lucerna {
 
 class WithoutBlur {
  public:
-  // Takes nothing where `controller` does not say so. noise_share: as BlurNoiseShare has it, or 1.
-  // Keeps a reference to `sums`, which must not change.
-  WithoutBlur(const ImageSums& sums, const RadiusController& controller, double noise_share);
+  // Takes nothing where `controller` does not say so, nor where `media_scatter`: segments of eye
+  // paths find few photons of great weight, which are not among a pixel's count, so that before a
+  // bright one has come chance looks like blur, and light would be lost. noise_share: as
+  // BlurNoiseShare has it, or 1. Keeps a reference to `sums`, which must not change.
+  WithoutBlur(const ImageSums& sums, const RadiusController& controller, double noise_share,
+              bool media_scatter = false);
 
   // sums.At(pixel), with blur taken off what photons brought, off the difference of the halves and
   // off both biases; squared deviations are those of passes that scatter like the result.

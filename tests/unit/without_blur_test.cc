@@ -87,6 +87,14 @@ TEST(WithoutBlurTest, LeavesOtherControllersAlone) {
   EXPECT_EQ(WithoutBlur(sums, *ppm, 1).At(0).photons, sums.At(0).photons);
 }
 
+// Photons of segments are not among a pixel's count.
+TEST(WithoutBlurTest, TakesNothingWhereMediaScatter) {
+  const ImageSums sums = SumsOf(1, 0.5, 0, 300);
+  const auto appm = Controller(RadiusControllerKind::kAppm);
+  EXPECT_NE(WithoutBlur(sums, *appm, 1).At(0).photons, sums.At(0).photons);
+  EXPECT_EQ(WithoutBlur(sums, *appm, 1, /*media_scatter=*/true).At(0).photons, sums.At(0).photons);
+}
+
 TEST(WithoutBlurTest, NoLightIsLessThanNone) {
   const ImageSums sums = SumsOf(1, 1.1 * kLight, 0, kPhotonsInPass);
   const auto appm = Controller(RadiusControllerKind::kAppm);
