@@ -632,11 +632,18 @@ class PathTracer {
     }
   }
 
+  // Coefficients mix as those of a thin layer do.
+  static Color ExtinctionOf(const Medium& medium) {
+    Color extinction = Working(FromFloat(medium.absorption));
+    AddTo(extinction, Working(FromFloat(medium.scattering)));
+    return extinction;
+  }
+
   // Whether a medium scatters light within `length`, which becomes the place; a distance is drawn
   // by the extinction of one channel, and weighed by the mean density of all.
   static bool IsScattered(const Medium& medium, PathNumbers& numbers, double& length,
                           Color& weight) {
-    const Color extinction = FromFloat(medium.Extinction());
+    const Color extinction = ExtinctionOf(medium);
     const auto channel = static_cast<std::size_t>(3 * numbers.Next());
     const double drawn = -std::log(1 - numbers.Next()) / extinction[channel];
     const bool is_scattered = drawn < length;
@@ -647,7 +654,7 @@ class PathTracer {
       kept[c] = extinction[c] > 0 ? std::exp(-extinction[c] * length) : 1;
       density += kept[c] * (is_scattered ? extinction[c] : 1) / 3;
     }
-    if (is_scattered) kept = Times(kept, FromFloat(medium.scattering));
+    if (is_scattered) kept = Times(kept, Working(FromFloat(medium.scattering)));
     weight = density > 0 ? Times(weight, Times(kept, 1 / density)) : Color{};
     return is_scattered;
   }
@@ -657,7 +664,8 @@ class PathTracer {
   // density is used.
   static bool IsScatteredUnevenly(const Medium& medium, const Ray& ray, double farthest,
                                   PathNumbers& numbers, double& length, Color& weight) {
-    const Color extinction = FromFloat(medium.Extinction());
+    const Color extinction = ExtinctionOf(medium);
+    const Color scattering = Working(FromFloat(medium.scattering));
     const double most = Largest(extinction) * static_cast<double>(medium.density->largest());
     if (!(most > 0)) return false;
     const double mean = (extinction[0] + extinction[1] + extinction[2]) / 3;
@@ -670,8 +678,8 @@ class PathTracer {
       const double share = mean * density / most;
       const bool is_real = numbers.Next() < share;
       for (std::size_t c = 0; c < 3; ++c) {
-        weight[c] *= is_real ? static_cast<double>(medium.scattering[static_cast<int>(c)]) / mean
-                             : (1 - extinction[c] * density / most) / (1 - share);
+        weight[c] *=
+            is_real ? scattering[c] / mean : (1 - extinction[c] * density / most) / (1 - share);
       }
       if (is_real) {
         length = t;
