@@ -342,6 +342,22 @@ TEST(PbrtMaterialsTest, AlphaMayBeATextureOnAnyShape) {
   }
 }
 
+// As in pbrt-v4: alpha 0 hides an emitter from rays alone, alpha below 0 its light, too.
+TEST(PbrtMaterialsTest, AnEmitterWithAlphaBelowZeroEmitsNothing) {
+  const std::string light = "AreaLightSource \"diffuse\" \"rgb L\" [1 1 1] ";
+  const std::string texture =
+      "Texture \"low\" \"float\" \"mix\" \"float amount\" 0.9 \"float tex1\" 0.5 "
+      "\"float tex2\" -0.1 ";
+  EXPECT_EQ(ReadWorld(light + "Shape \"sphere\" \"float alpha\" 0").spheres.size(), 1U);
+  for (const std::string& shape :
+       {light + "Shape \"sphere\" \"float alpha\" -0.01",
+        texture + light + "Shape \"sphere\" \"texture alpha\" \"low\""}) {
+    SCOPED_TRACE(shape);
+    EXPECT_TRUE(ReadWorld(shape).spheres.empty());
+    EXPECT_THAT(SaidOfWorld(shape), HasSubstr("is below 0 everywhere: it emits no light"));
+  }
+}
+
 // What a float texture that is declared by `text` as "t" is at a place.
 float NumberOf(const std::string& text, const TexturePlace& place) {
   const Scene scene =

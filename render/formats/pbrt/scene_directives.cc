@@ -20,11 +20,14 @@
 namespace lucerna {
 namespace {
 
-bool IsInvisible(const ShapeSet& shapes) {
-  bool is_seen = false;
-  ForEachShapeTraits(shapes,
-                     [&](const ShapeTraits& traits) { is_seen = is_seen || traits.alpha > 0; });
-  return !is_seen;
+// Whether they are nowhere: no ray meets them, and they emit nothing. A light of alpha 0 is not: as
+// in pbrt-v4 it emits without being seen. One below 0 emits nothing there, and nothing here.
+bool IsNowhere(const ShapeSet& shapes, bool is_light) {
+  bool is_somewhere = false;
+  ForEachShapeTraits(shapes, [&](const ShapeTraits& traits) {
+    is_somewhere = is_somewhere || traits.alpha > 0 || (is_light && traits.alpha == 0);
+  });
+  return !is_somewhere;
 }
 
 // Whether it is hair, or mixes it. Each material is looked at once: mixes of mixes double.
@@ -327,7 +330,11 @@ bool DirectiveReader::AddShape(Arguments& arguments, std::optional<TriangleMesh>
   if (IsOfHair(scene_.materials, state.material) && !IsTubesAlone(shapes)) {
     list.Error("has the material hair, which is for curves of type flat or cylinder alone");
   }
-  if (!is_light && IsInvisible(shapes)) return true;  // no ray meets it, and nothing comes from it
+  if (IsNowhere(shapes, is_light)) {
+    if (is_light && !diagnostics_.has_error())
+      list.Warning("alpha", "is below 0 everywhere: it emits no light");
+    return true;
+  }
   if (!HasRoomFor(shapes, arguments)) return true;
   if (is_light && !diagnostics_.has_error() && !(shapes.Area() > 0))
     WarnOfLightWithoutArea(arguments.location(), list.subject(), diagnostics_);

@@ -180,12 +180,12 @@ constexpr Kind<ShapeReader> kKinds[] = {
 
 void ReadAlpha(ParameterList& parameters, const TextureNames& numbers, ShapeTraits& traits) {
   if (!parameters.IsTexture("alpha")) {
-    traits.alpha = static_cast<float>(std::clamp(parameters.Float("alpha", 1), 0.0, 1.0));
+    traits.alpha = static_cast<float>(std::min(parameters.Float("alpha", 1), 1.0));
     return;
   }
   const NamedTexture* alpha = FindNumbers("alpha", parameters, numbers);
   if (alpha == nullptr) return;
-  traits.alpha = std::clamp(alpha->largest, 0.0F, 1.0F);
+  traits.alpha = std::min(alpha->largest, 1.0F);
   if (alpha->least >= 1 || alpha->largest <= 0) return;
   traits.alpha_texture = alpha->number;
 }
