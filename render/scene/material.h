@@ -69,6 +69,7 @@ struct MaterialNumbers {
   Rgb eta = {1, 1, 1};             // conductor, under a coat too: index of refraction
   Rgb k = {0, 0, 0};               // the same: absorption
   bool is_at_wavelengths = false;  // eta and k are those of a pass's wavelengths
+  bool is_metal_in_coat = false;   // eta and k are against the coat, else against vacuum
   float ior = 1.5F;                // dielectric, coat, hair, subsurface: inside over outside
   Dispersion dispersion;           // dielectric; `ior` is that at the d line
   float alpha_u = 0;               // of metals, dielectrics and coats: GGX widths; 0 and 0:

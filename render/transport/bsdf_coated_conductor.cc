@@ -24,8 +24,8 @@ bool IsMirror(const Material& material) {
 
 // What the metal reflects of light that comes to it through the coat, in the space of its indices.
 Rgb MetalInCoat(const Material& material, float cosine) {
-  return FresnelConductor(cosine, material.eta * (1 / material.ior),
-                          material.k * (1 / material.ior));
+  const float outside = material.is_metal_in_coat ? 1 : material.ior;
+  return FresnelConductor(cosine, material.eta * (1 / outside), material.k * (1 / outside));
 }
 
 // The share of the residual that is left when the metal absorbs: a power of its reflectance for

@@ -90,8 +90,9 @@ struct Surface {
   Color reflectance{};  // diffuse, working space
   Color eta{}, k{};     // conductor, Rec. 709
   double ior = 1, alpha_u = 0, alpha_v = 0;
-  Color transmittance{};  // of a sheet, working space
-  double thickness = 0;   // of a coat
+  double around_metal = 1;  // the index that eta and k of a metal under a coat are divided by
+  Color transmittance{};    // of a sheet, working space
+  double thickness = 0;     // of a coat
   int base_hits = 0;
   Color coat_albedo{};  // of one scattering in it; over a metal Rec. 709
   double phase_g = 0;   // its mean cosine
@@ -130,7 +131,8 @@ Material CompletedAt(const Scene& scene, const Material& material, const Texture
 }
 
 Surface SurfaceOf(const Scene& scene, const SurfacePoint& point) {
-  const TexturePlace place = {UvAt(scene, point), point.position, point.geometric_normal};
+  const TexturePlace place = {UvAt(scene, point), point.position, point.geometric_normal,
+                              VertexColorAt(scene, point)};
   const Material material = CompletedAt(scene, scene.materials[point.material], place);
   Surface surface;
   surface.kind = material.kind;
@@ -141,6 +143,7 @@ Surface SurfaceOf(const Scene& scene, const SurfacePoint& point) {
   surface.eta = FromFloat(material.eta);
   surface.k = FromFloat(material.k);
   surface.ior = static_cast<double>(material.ior);
+  surface.around_metal = material.is_metal_in_coat ? 1 : surface.ior;
   surface.alpha_u = static_cast<double>(std::max(material.alpha_u, 1e-4F));
   surface.alpha_v = static_cast<double>(std::max(material.alpha_v, 1e-4F));
   surface.transmittance = Working(FromFloat(material.transmittance));
@@ -283,7 +286,7 @@ bool ReflectAtMetal(const Surface& surface, double u1, double u2, Double3& direc
   if (!(facet.cos_m > 0)) return false;
   direction = facet.m * (2 * facet.cos_m) - up;
   if (!(direction.z > 0)) return false;
-  weight = Times(Times(weight, MetalColor(surface, facet.cos_m, surface.ior)),
+  weight = Times(Times(weight, MetalColor(surface, facet.cos_m, surface.around_metal)),
                  FacetWeight(metal, facet, up, direction));
   return true;
 }

@@ -357,6 +357,21 @@ TEST(CoatedMetalTest, SmoothOnSmoothIsAMirrorOfAllOrders) {
     EXPECT_NEAR(sample.weight[c], expected[c], 1e-5F);
 }
 
+// A metal that is given as it is in its coat has its reflectance at right angles there.
+TEST(CoatedMetalTest, AMetalGivenInItsCoatReflectsWhatItSaysThere) {
+  constexpr float kReflectance = 0.6F;
+  Material material = CoatedMetal(Gray(1), Gray(AbsorptionFor(kReflectance)), 0, 0, 0);
+  material.is_metal_in_coat = true;
+  material.base_hits = 1000;
+  BsdfSample sample;
+  ASSERT_TRUE(SampleBsdf(material, {0, 0, 1}, 0.5F, 0.5F, 0.5F, Carried::kRadiance, sample));
+  constexpr float kCoat = 0.04F;  // of an index of 1.5
+  const float expected =
+      kCoat + (1 - kCoat) * (1 - kCoat) * kReflectance / (1 - kCoat * kReflectance);
+  for (int c = 0; c < 3; ++c)
+    EXPECT_NEAR(sample.weight[c], expected, 1e-5F);
+}
+
 // Flux from `wo` that leaves a coated metal after meeting the metal or what is in the layer, and
 // its mean direction along the mirror's, by random walks between a dielectric and a metal, whose
 // BSDFs have tests of their own.

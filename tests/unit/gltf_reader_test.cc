@@ -1184,16 +1184,73 @@ TEST(GltfReaderTest, TheSpecularExtensionScalesWhatTheCoatReflects) {
   EXPECT_EQ(coated({{"specularFactor", 0}}).kind, Material::Kind::kDiffuse);
 }
 
+TEST(GltfReaderTest, AClearcoatLiesOverMetalAndOverWhatIsNone) {
+  const auto read = [](double metallic, const Json& clearcoat) {
+    return WithMaterial({{"pbrMetallicRoughness",
+                          {{"baseColorFactor", {0.5, 0.5, 0.5, 1}},
+                           {"metallicFactor", metallic},
+                           {"roughnessFactor", 0.6}}},
+                         {"extensions", {{"KHR_materials_clearcoat", clearcoat}}}});
+  };
+  const Json whole = {{"clearcoatFactor", 1}, {"clearcoatRoughnessFactor", 0.2}};
+  const Material paint = MaterialOf(read(1, whole));
+  EXPECT_EQ(paint.kind, Material::Kind::kCoatedConductor);
+  EXPECT_TRUE(paint.is_metal_in_coat);
+  EXPECT_FLOAT_EQ(paint.ior, 1.5F);
+  EXPECT_FLOAT_EQ(paint.base_alpha_u, 0.36F);
+  EXPECT_FLOAT_EQ(paint.alpha_u, 0.04F);
+  EXPECT_FLOAT_EQ(paint.k.g, 2);  // of a reflectance of one half
+  const Material lacquer = MaterialOf(read(0, whole));
+  EXPECT_EQ(lacquer.kind, Material::Kind::kCoatedDiffuse);
+  EXPECT_TRUE(lacquer.coat_passes_rest);
+  EXPECT_FLOAT_EQ(lacquer.alpha_u, 0.04F);
+  // Without a roughness it is smooth, and without a factor it is not there.
+  EXPECT_EQ(MaterialOf(read(1, {{"clearcoatFactor", 1}})).alpha_u, 0);
+  EXPECT_EQ(MaterialOf(read(1, {{"clearcoatRoughnessFactor", 1}})).kind,
+            Material::Kind::kConductor);
+
+  const Scene thin = read(1, {{"clearcoatFactor", 0.25}});
+  const Material& mix = MaterialOf(thin);
+  ASSERT_EQ(mix.kind, Material::Kind::kMix);
+  EXPECT_FLOAT_EQ(mix.amount, 0.25F);
+  EXPECT_EQ(PartOf(thin, mix, 0).kind, Material::Kind::kConductor);
+  EXPECT_EQ(PartOf(thin, mix, 1).kind, Material::Kind::kCoatedConductor);
+}
+
+TEST(GltfReaderTest, WhatAClearcoatCannotBeIsSaid) {
+  const auto said = [](Json material) {
+    GltfBuilder builder;
+    builder.AddCamera();
+    const int texture = builder.AddTexture(Png(2, 1, 3, {0, 255, 0, 0, 9, 0}), {});
+    material["extensions"]["KHR_materials_clearcoat"]["clearcoatFactor"] = 1;
+    const Json rough = {{"index", texture}};
+    material["extensions"]["KHR_materials_clearcoat"]["clearcoatRoughnessTexture"] = rough;
+    material["extensions"]["KHR_materials_clearcoat"]["clearcoatRoughnessFactor"] = 1;
+    material["pbrMetallicRoughness"]["metallicRoughnessTexture"] = rough;
+    builder.AddNode(
+        {{"mesh", builder.AddTriangleMesh({{"material", builder.Add("materials", material)}})}});
+    return Said(builder.Read());
+  };
+  EXPECT_THAT(said({{"pbrMetallicRoughness", {{"metallicFactor", 0}}}}),
+              Not(HasSubstr("clearcoat")));
+  EXPECT_THAT(said({{"pbrMetallicRoughness",
+                     {{"baseColorFactor", {0.5, 0.5, 0.5, 1}}, {"metallicFactor", 1}}}}),
+              Not(HasSubstr("largest roughness")));  // blue is 0: it is no metal
+  EXPECT_THAT(said({{"pbrMetallicRoughness", {{"metallicFactor", 0}}},
+                    {"extensions", {{"KHR_materials_transmission", {{"transmissionFactor", 1}}}}}}),
+              HasSubstr("glass has no coat"));
+}
+
 // ---- Extensions
 
 TEST(GltfReaderTest, AnUnknownExtensionIsAnErrorWhereItIsRequiredElseANote) {
   GltfBuilder builder;
   builder.AddCamera();
   builder.AddNode({{"mesh", builder.AddTriangleMesh()}});
-  builder.json["extensionsUsed"] = {"KHR_materials_clearcoat", "KHR_materials_ior"};
+  builder.json["extensionsUsed"] = {"KHR_materials_sheen", "KHR_materials_ior"};
   const ParsedScene used = builder.Read();
   EXPECT_TRUE(used.ok());
-  EXPECT_THAT(Said(used), HasSubstr("note: the extension \"KHR_materials_clearcoat\" is ignored"));
+  EXPECT_THAT(Said(used), HasSubstr("note: the extension \"KHR_materials_sheen\" is ignored"));
   EXPECT_THAT(Said(used), ::testing::Not(HasSubstr("KHR_materials_ior")));
   builder.json["extensionsRequired"] = {"KHR_draco_mesh_compression"};
   EXPECT_THAT(Said(builder.Read()),
@@ -1207,7 +1264,7 @@ TEST(GltfReaderTest, ARequiredExtensionThatOnlyChangesLooksIsAWarning) {
   builder.AddNode({{"mesh", builder.AddTriangleMesh()}});
   for (const char* name :
        {"EXT_lights_image_based", "KHR_animation_pointer", "KHR_materials_anisotropy",
-        "KHR_materials_clearcoat", "KHR_materials_diffuse_transmission", "KHR_materials_dispersion",
+        "KHR_materials_diffuse_transmission", "KHR_materials_dispersion",
         "KHR_materials_iridescence", "KHR_materials_sheen", "KHR_materials_unlit",
         "KHR_materials_variants", "KHR_xmp", "KHR_xmp_json_ld", "MSFT_lod", "VRM", "VRMC_vrm"}) {
     builder.json["extensionsUsed"] = {name};

@@ -25,10 +25,12 @@
 namespace lucerna {
 namespace {
 
-constexpr std::array<std::string_view, 10> kExtensions = {
-    "EXT_mesh_gpu_instancing", "KHR_lights_punctual",        "KHR_materials_emissive_strength",
-    "KHR_materials_ior",       "KHR_materials_transmission", "KHR_materials_volume",
-    "KHR_materials_specular",  "KHR_mesh_quantization",      "KHR_node_visibility",
+constexpr std::array<std::string_view, 11> kExtensions = {
+    "EXT_mesh_gpu_instancing", "KHR_lights_punctual",
+    "KHR_materials_clearcoat", "KHR_materials_emissive_strength",
+    "KHR_materials_ior",       "KHR_materials_transmission",
+    "KHR_materials_volume",    "KHR_materials_specular",
+    "KHR_mesh_quantization",   "KHR_node_visibility",
     "KHR_texture_transform"};
 
 bool IsRead(const std::string& extension) {
@@ -45,7 +47,6 @@ constexpr std::array kLeftOut = {
     ExtensionRule{"EXT_lights_image_based", "its environment light is left out"},
     ExtensionRule{"KHR_animation_pointer", "nothing moves"},
     ExtensionRule{"KHR_materials_anisotropy", "highlights are round"},
-    ExtensionRule{"KHR_materials_clearcoat", "the coat over a material is left out"},
     ExtensionRule{"KHR_materials_diffuse_transmission", "no light comes through diffuse surfaces"},
     ExtensionRule{"KHR_materials_dispersion", "glass does not split light into colours"},
     ExtensionRule{"KHR_materials_iridescence", "thin films have no colours"},

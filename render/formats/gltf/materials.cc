@@ -23,11 +23,41 @@ bool IsWhite(Rgb color) {
   return color.r >= 1 && color.g >= 1 && color.b >= 1;
 }
 
+// With which pictures of roughness are read as those of GGX widths.
+PixelEncoding SquaredNumbers() {
+  PixelEncoding squared;
+  squared.kind = PixelEncoding::Kind::kGamma;
+  squared.gamma = 2;
+  return squared;
+}
+
 // A number of a material, or a texture in its place.
 struct Amount {
   float least = 0, largest = 0;
   std::int32_t texture = kNoTexture;
 };
+
+// The facets of the surface itself.
+void SetRoughness(const Amount& alpha, Material& material) {
+  const FacetWidths widest = WidthsOf(alpha.largest, alpha.largest, false);
+  material.remaps_roughness = false;
+  material.alpha_u = widest.u;
+  material.alpha_v = widest.v;
+  if (alpha.texture == kNoTexture || widest.u == 0) return;
+  material.may_be_smooth = WidthsOf(alpha.least, alpha.least, false).u == 0;
+  material.roughness_textures[0] = material.roughness_textures[1] = alpha.texture;
+}
+
+// Those of the metal under a coat.
+void SetBaseRoughness(const Amount& alpha, Material& material) {
+  const FacetWidths widest = WidthsOf(alpha.largest, alpha.largest, false);
+  material.remaps_roughness = false;
+  material.base_alpha_u = widest.u;
+  material.base_alpha_v = widest.v;
+  if (alpha.texture == kNoTexture || widest.u == 0) return;
+  material.base_may_be_smooth = WidthsOf(alpha.least, alpha.least, false).u == 0;
+  material.roughness_textures[2] = material.roughness_textures[3] = alpha.texture;
+}
 
 // Reads one material.
 class MaterialReader {
@@ -47,14 +77,19 @@ class MaterialReader {
   std::int32_t AppendTexture(const JsonObject& info, const GltfTextureUse& use);
   std::int32_t Add(Material material);
   std::int32_t AddMix(std::int32_t first, std::int32_t second, const Amount& amount);
-  void SetRoughness(Material& material) const;
 
   void ReadSpecular();
   void ReadBaseColor(const JsonObject& pbr);
   void ReadRoughness(const JsonObject& pbr);
   std::int32_t ReadSurface(const JsonObject& pbr);
+  // Metal as `metallic` says, else glass as `transmission` says, else a coat over a diffuse base.
+  std::int32_t AddBare(const Amount& metallic, const Amount& transmission);
+  // The same below a clear coat whose facets have the GGX width `coat`.
+  std::int32_t AddBelowClearcoat(const Amount& metallic, const Amount& coat);
+  [[nodiscard]] Material Metal() const;
   std::int32_t AddMetal();
-  std::int32_t AddCoated();
+  std::int32_t AddMetalBelow(const Amount& coat);
+  std::int32_t AddCoated(float coat_ior, const Amount& coat);
   std::int32_t AddGlass();
   // What fills the glass, or kNoMedium.
   std::int32_t AddMedium(const JsonObject& volume, double thickness);
@@ -129,18 +164,6 @@ std::int32_t MaterialReader::AddMix(std::int32_t first, std::int32_t second, con
   return static_cast<std::int32_t>(scene_.materials.size()) - 1;
 }
 
-void MaterialReader::SetRoughness(Material& material) const {
-  const FacetWidths widest = WidthsOf(alpha_.largest, alpha_.largest, false);
-  const FacetWidths narrowest = WidthsOf(alpha_.least, alpha_.least, false);
-  material.remaps_roughness = false;
-  material.alpha_u = widest.u;
-  material.alpha_v = widest.v;
-  if (alpha_.texture == kNoTexture || widest.u == 0) return;
-  material.may_be_smooth = narrowest.u == 0;
-  material.roughness_textures[0] = alpha_.texture;
-  material.roughness_textures[1] = alpha_.texture;
-}
-
 // The index of refraction whose reflectance at right angles is that share of the one of `ior_`.
 void MaterialReader::ReadSpecular() {
   const JsonObject specular = ExtensionOf(object_, "KHR_materials_specular");
@@ -179,34 +202,45 @@ void MaterialReader::ReadBaseColor(const JsonObject& pbr) {
 
 void MaterialReader::ReadRoughness(const JsonObject& pbr) {
   const auto roughness = static_cast<float>(pbr.Held("roughnessFactor", 1, kJsonFactor));
-  // Pictures of roughness are read as those of its square.
-  PixelEncoding squared;
-  squared.kind = PixelEncoding::Kind::kGamma;
-  squared.gamma = 2;
-  alpha_ = ReadAmount(pbr.Child("metallicRoughnessTexture"), PictureUse::kGreen, squared,
+  alpha_ = ReadAmount(pbr.Child("metallicRoughnessTexture"), PictureUse::kGreen, SquaredNumbers(),
                       roughness * roughness, 1);
 }
 
-std::int32_t MaterialReader::AddMetal() {
+Material MaterialReader::Metal() const {
   Material metal;
   metal.kind = Material::Kind::kConductor;
   metal.eta = Gray(1);
   metal.k = {AbsorptionFor(base_color_.r), AbsorptionFor(base_color_.g),
              AbsorptionFor(base_color_.b)};
   metal.texture = base_texture_;
-  SetRoughness(metal);
+  return metal;
+}
+
+std::int32_t MaterialReader::AddMetal() {
+  Material metal = Metal();
+  SetRoughness(alpha_, metal);
   return Add(std::move(metal));
 }
 
-std::int32_t MaterialReader::AddCoated() {
+std::int32_t MaterialReader::AddMetalBelow(const Amount& coat) {
+  Material metal = Metal();
+  metal.kind = Material::Kind::kCoatedConductor;
+  metal.is_metal_in_coat = true;
+  metal.ior = static_cast<float>(kDefaultIor);
+  SetRoughness(coat, metal);
+  SetBaseRoughness(alpha_, metal);
+  return Add(std::move(metal));
+}
+
+std::int32_t MaterialReader::AddCoated(float coat_ior, const Amount& coat) {
   Material coated;
   // An index of 1 reflects nothing.
-  coated.kind = coat_ior_ > 1 ? Material::Kind::kCoatedDiffuse : Material::Kind::kDiffuse;
+  coated.kind = coat_ior > 1 ? Material::Kind::kCoatedDiffuse : Material::Kind::kDiffuse;
   coated.reflectance = base_color_;
   coated.texture = base_texture_;
-  coated.ior = coat_ior_;
-  coated.coat_passes_rest = coat_ior_ > 1;
-  if (coat_ior_ > 1) SetRoughness(coated);
+  coated.ior = coat_ior;
+  coated.coat_passes_rest = coat_ior > 1;
+  if (coat_ior > 1) SetRoughness(coat, coated);
   return Add(std::move(coated));
 }
 
@@ -250,7 +284,7 @@ std::int32_t MaterialReader::AddGlass() {
     }
     glass.kind = Material::Kind::kDielectric;
     // Facets between equal media bend nothing.
-    if (ior_ > 1) SetRoughness(glass);
+    if (ior_ > 1) SetRoughness(alpha_, glass);
     surface_.traits.medium_inside = AddMedium(volume, thickness);
     return Add(std::move(glass));
   }
@@ -267,24 +301,55 @@ std::int32_t MaterialReader::AddGlass() {
   return Add(std::move(glass));
 }
 
+std::int32_t MaterialReader::AddBare(const Amount& metallic, const Amount& transmission) {
+  if (metallic.least >= 1) return AddMetal();
+  std::int32_t surface = transmission.largest > 0 ? AddGlass() : AddCoated(coat_ior_, alpha_);
+  if (transmission.largest > 0 && transmission.least < 1)
+    surface = AddMix(AddCoated(coat_ior_, alpha_), surface, transmission);
+  return metallic.largest > 0 ? AddMix(surface, AddMetal(), metallic) : surface;
+}
+
+std::int32_t MaterialReader::AddBelowClearcoat(const Amount& metallic, const Amount& coat) {
+  if (metallic.least >= 1) return AddMetalBelow(coat);
+  // What has nearly the coat's index reflects nothing below it.
+  const std::int32_t base = AddCoated(static_cast<float>(kDefaultIor), coat);
+  return metallic.largest > 0 ? AddMix(base, AddMetalBelow(coat), metallic) : base;
+}
+
 std::int32_t MaterialReader::ReadSurface(const JsonObject& pbr) {
-  if (ExtensionOf(object_, "KHR_materials_unlit").exists()) {
-    coat_ior_ = 1;
-    return AddCoated();
-  }
-  const auto metallic_factor = static_cast<float>(pbr.Held("metallicFactor", 1, kJsonFactor));
+  if (ExtensionOf(object_, "KHR_materials_unlit").exists()) return AddCoated(1, {});
+  const auto factor = [](const JsonObject& object, const char* name, double otherwise) {
+    return static_cast<float>(object.Held(name, otherwise, kJsonFactor));
+  };
   const PixelEncoding linear = {PixelEncoding::Kind::kLinear};
   const Amount metallic = ReadAmount(pbr.Child("metallicRoughnessTexture"), PictureUse::kBlue,
-                                     linear, metallic_factor, 1);
-  if (metallic.least >= 1) return AddMetal();
-  const JsonObject transmission_of = ExtensionOf(object_, "KHR_materials_transmission");
-  const Amount transmission =
-      ReadAmount(transmission_of.Child("transmissionTexture"), PictureUse::kRed, linear,
-                 static_cast<float>(transmission_of.Held("transmissionFactor", 0, kJsonFactor)), 1);
-  std::int32_t surface = transmission.largest > 0 ? AddGlass() : AddCoated();
-  if (transmission.largest > 0 && transmission.least < 1)
-    surface = AddMix(AddCoated(), surface, transmission);
-  return metallic.largest > 0 ? AddMix(surface, AddMetal(), metallic) : surface;
+                                     linear, factor(pbr, "metallicFactor", 1), 1);
+  Amount transmission;
+  if (metallic.least < 1) {
+    const JsonObject given = ExtensionOf(object_, "KHR_materials_transmission");
+    transmission = ReadAmount(given.Child("transmissionTexture"), PictureUse::kRed, linear,
+                              factor(given, "transmissionFactor", 0), 1);
+  }
+  const JsonObject given = ExtensionOf(object_, "KHR_materials_clearcoat");
+  const Amount clearcoat = ReadAmount(given.Child("clearcoatTexture"), PictureUse::kRed, linear,
+                                      factor(given, "clearcoatFactor", 0), 1);
+  if (!(clearcoat.largest > 0)) return AddBare(metallic, transmission);
+  if (transmission.largest > 0) {
+    given.Warning("is left out: glass has no coat");
+    return AddBare(metallic, transmission);
+  }
+  if (given.Has("clearcoatNormalTexture") || normal_map_ != kNoTexture)
+    given.Warning("follows normalTexture, as what is below it does");
+  const float roughness = factor(given, "clearcoatRoughnessFactor", 0);
+  Amount coat = ReadAmount(given.Child("clearcoatRoughnessTexture"), PictureUse::kGreen,
+                           SquaredNumbers(), roughness * roughness, 1);
+  if (coat.texture != kNoTexture && alpha_.texture != kNoTexture && metallic.largest > 0) {
+    given.Warning("has its largest roughness everywhere, since that of the metal is a texture");
+    coat = {coat.largest, coat.largest};
+  }
+  const std::int32_t coated = AddBelowClearcoat(metallic, coat);
+  if (clearcoat.least >= 1) return coated;
+  return AddMix(AddBare(metallic, transmission), coated, clearcoat);
 }
 
 void MaterialReader::ReadEmission() {
