@@ -11,6 +11,7 @@
 #include "render/analysis/reachability.h"
 #include "render/base/text.h"
 #include "render/math/double3.h"
+#include "render/scene/materials_in_use.h"
 #include "render/scene/scene_extent.h"
 #include "render/scene/shape_lists.h"
 
@@ -63,28 +64,6 @@ constexpr std::size_t kFewestToSplit = 1000;
 std::string Quoted(const Material& material) {
   return material.name.empty() ? std::string("a material without a name")
                                : Concat("material \"", material.name, "\"");
-}
-
-// Which materials are on some shape.
-std::vector<std::uint8_t> MaterialsInUse(const Scene& scene) {
-  std::vector<std::uint8_t> in_use(scene.materials.size());
-  ForEachShapeTraits(scene, [&](const ShapeTraits& traits) {
-    in_use[static_cast<std::size_t>(traits.material)] = 1;
-  });
-  // And which ones mixes choose from.
-  std::vector<std::int32_t> to_look_at;
-  for (std::size_t i = 0; i < in_use.size(); ++i) {
-    if (in_use[i] != 0) to_look_at.push_back(static_cast<std::int32_t>(i));
-  }
-  while (!to_look_at.empty()) {
-    const Material& material = scene.materials[static_cast<std::size_t>(to_look_at.back())];
-    to_look_at.pop_back();
-    if (material.kind != Material::Kind::kMix) continue;
-    for (const std::int32_t part : material.mixed) {
-      if (std::exchange(in_use[static_cast<std::size_t>(part)], 1) == 0) to_look_at.push_back(part);
-    }
-  }
-  return in_use;
 }
 
 // The first material in use that `is_so`; nullptr without one.

@@ -15,6 +15,7 @@
 #include "render/base/text.h"
 #include "render/formats/scene_unit.h"
 #include "render/scene/degenerate_triangles.h"
+#include "render/scene/materials_in_use.h"
 #include "render/scene/scene_at_time.h"
 #include "render/scene/scene_extent.h"
 #include "render/scene/shape_lists.h"
@@ -276,6 +277,19 @@ void StopGatheringOnThinShapes(Scene& scene) {
   });
 }
 
+// They are made before the first pass, by the coordinator and by every worker, which neither a
+// cancel nor an end of the process interrupts.
+void CheckTables(const Scene& scene, const SourceLocation& whole, Diagnostics& diagnostics) {
+  constexpr double kMostSeconds = 60;
+  const double seconds = SecondsOfTables(scene.materials);
+  if (seconds <= kMostSeconds) return;
+  diagnostics.Error(
+      whole, Concat("the tables of so many different coats and subsurface materials would take ",
+                    std::llround(seconds), " s of processor time in every process, more than ",
+                    std::llround(kMostSeconds),
+                    "; give more of them the same roughness, index and thickness"));
+}
+
 }  // namespace
 
 void WarnOfLightWithoutArea(const SourceLocation& location, const std::string& subject,
@@ -313,6 +327,8 @@ Scene FinishScene(UnfinishedScene unfinished, const std::string& main_file,
   StopGatheringOnThinShapes(scene);
   // Of copies for thin shapes.
   JoinMixes(scene.materials);
+  DropUnusedMaterials(scene);
+  CheckTables(scene, whole, diagnostics);
   return std::move(scene);
 }
 

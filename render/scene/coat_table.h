@@ -96,10 +96,11 @@ struct CoatTable {
 // number: width / (1 + width), of the facets of the coat's surface or of the metal under it, or the
 // share of light that one crossing of the layer at right angles takes, 1 - exp(-thickness).
 struct CoatFamily {
+  static constexpr int kTables = 9;
   enum class Differing : std::uint8_t { kSurface, kBase, kThickness };
   Differing differing = Differing::kSurface;
   float least = 0, largest = 0;
-  std::vector<CoatTable> tables;  // at least 2, evenly spaced from the least number
+  std::vector<CoatTable> tables;  // kTables, evenly spaced from the least number
 
   // The number of a width, and the width of a number. Nearly the width where facets are flat, and
   // below 1 for all: a texture that is very rough in one place leaves the tables of others dense.

@@ -4,13 +4,14 @@
 #include <cmath>
 #include <cstdint>
 #include <map>
-#include <tuple>
 #include <utility>
 #include <vector>
 
 #include "render/base/parallel.h"
 #include "render/math/rng.h"
 #include "render/math/warp.h"
+#include "render/scene/coat_table.h"
+#include "render/scene/materials_in_use.h"
 #include "render/transport/bsdf.h"
 #include "render/transport/coat.h"
 #include "render/transport/coat_walk.h"
@@ -38,8 +39,7 @@ constexpr double kMostWidening = 4;
 // and from the base. A thick layer that absorbs nothing would hold a process for minutes.
 constexpr std::int64_t kEventsOfNode = std::int64_t{1} << 18;
 constexpr std::int64_t kEventsFromBase = std::int64_t{1} << 22;
-// Tables of a family, and the narrowest width. A coat that is smoother passes as much.
-constexpr int kFamily = 9;
+// The narrowest width of a family. A coat that is smoother passes as much.
 constexpr float kNarrowestOfFamily = 0.02F;
 
 // Averages over the facets that are seen from `w`: visit(m, share of the average) for each. Few
@@ -628,12 +628,6 @@ CoatTable MakeCoat(const Material& original) {
   return table;
 }
 
-bool HasCoat(const Material& material) {
-  return material.kind == Material::Kind::kCoatedDiffuse ||
-         material.kind == Material::Kind::kCoatedConductor ||
-         material.kind == Material::Kind::kSubsurface;
-}
-
 // A table that is to be made, of `material`.
 struct WantedCoat {
   Material material;
@@ -663,11 +657,11 @@ std::shared_ptr<const CoatFamily> FamilyOf(const Material& material,
     family->least = CoatFamily::SpacingOf(kNarrowestOfFamily);
     family->largest = CoatFamily::SpacingOf(std::max(widest, 2 * kNarrowestOfFamily));
   }
-  family->tables.resize(kFamily);
-  for (int i = 0; i < kFamily; ++i) {
+  family->tables.resize(CoatFamily::kTables);
+  for (int i = 0; i < CoatFamily::kTables; ++i) {
     Material one = material;
     const float number = family->least + (family->largest - family->least) * static_cast<float>(i) /
-                                             static_cast<float>(kFamily - 1);
+                                             static_cast<float>(CoatFamily::kTables - 1);
     switch (family->differing) {
       case kSurface:
         one.alpha_u = one.alpha_v = CoatFamily::WidthAt(number);
@@ -677,7 +671,7 @@ std::shared_ptr<const CoatFamily> FamilyOf(const Material& material,
         break;
       case kThickness:
         // Of a thick layer the number is 1.
-        if (i < kFamily - 1) one.thickness = -std::log1p(-number);
+        if (i < CoatFamily::kTables - 1) one.thickness = -std::log1p(-number);
         break;
     }
     wanted.push_back({std::move(one), &family->tables[static_cast<std::size_t>(i)]});
@@ -688,39 +682,21 @@ std::shared_ptr<const CoatFamily> FamilyOf(const Material& material,
 }  // namespace
 
 void PrepareCoats(std::vector<Material>& materials, int threads) {
-  using Key = std::tuple<Material::Kind, float, float, float, float, float, float, std::int32_t,
-                         bool, float, bool>;
-  const auto key_of = [](const Material& material) {
-    const bool has_metal = material.kind == Material::Kind::kCoatedConductor;
-    return Key{material.kind,
-               material.ior,
-               material.thickness,
-               material.alpha_u,
-               material.alpha_v,
-               has_metal ? material.base_alpha_u : 0,
-               has_metal ? material.base_alpha_v : 0,
-               has_metal || material.HasHaze() ? material.base_hits : 0,
-               material.HasHaze(),
-               material.HasHaze() ? material.phase_g : 0,
-               material.coat_passes_rest};
-  };
-  std::map<Key, std::shared_ptr<const CoatTable>> tables;
-  std::map<std::pair<Key, CoatFamily::Differing>, std::shared_ptr<const CoatFamily>> families;
+  std::map<CoatNumbers, std::shared_ptr<const CoatTable>> tables;
+  std::map<std::pair<CoatNumbers, CoatFamily::Differing>, std::shared_ptr<const CoatFamily>>
+      families;
   std::vector<WantedCoat> wanted;
   for (Material& material : materials) {
-    if (!HasCoat(material)) continue;
-    // Smooth on smooth there is a closed form for all.
-    if (material.kind == Material::Kind::kCoatedConductor && PropertiesOf(material).is_smooth)
-      continue;
+    if (!HasCoatTables(material)) continue;
     if (material.HasCoatTexture()) {
-      auto& family = families[{key_of(material), DifferingOf(material)}];
+      auto& family = families[{CoatNumbersOf(material), DifferingOf(material)}];
       if (family == nullptr) family = FamilyOf(material, wanted);
       material.owned_coats = family;
       material.coats = family.get();
       FitCoat(material);
       continue;
     }
-    auto& table = tables[key_of(material)];
+    auto& table = tables[CoatNumbersOf(material)];
     if (table == nullptr) {
       const auto made = std::make_shared<CoatTable>();
       wanted.push_back({material, made.get()});

@@ -16,6 +16,7 @@
 #include "render/math/color_space.h"
 #include "render/scene/noise.h"
 #include "render/scene/render_settings.h"
+#include "render/scene/saturated_colors.h"
 #include "render/scene/subsurface_table.h"
 #include "render/transport/material_at.h"
 #include "render/transport/working_space.h"
@@ -356,6 +357,44 @@ TEST(PbrtMaterialsTest, AnEmitterWithAlphaBelowZeroEmitsNothing) {
     EXPECT_TRUE(ReadWorld(shape).spheres.empty());
     EXPECT_THAT(SaidOfWorld(shape), HasSubstr("is below 0 everywhere: it emits no light"));
   }
+}
+
+// What no shape has takes no part: a saturated metal does not make a job carry wavelengths, and no
+// tables are made of coats. Parts of mixes on shapes stay.
+TEST(PbrtMaterialsTest, MaterialsThatNoShapeHasAreDropped) {
+  const Scene scene = ReadWorld(
+      "MakeNamedMaterial \"gold\" \"string type\" \"conductor\" "
+      "\"spectrum eta\" \"metal-Au-eta\" \"spectrum k\" \"metal-Au-k\" "
+      "MakeNamedMaterial \"coat\" \"string type\" \"coateddiffuse\" "
+      "MakeNamedMaterial \"part\" \"string type\" \"coateddiffuse\" \"float roughness\" 0.3 "
+      "MakeNamedMaterial \"white\" \"string type\" \"diffuse\" "
+      "MakeNamedMaterial \"mix\" \"string type\" \"mix\" "
+      "\"string materials\" [\"part\" \"white\"] NamedMaterial \"mix\" Shape \"sphere\"");
+  std::map<std::string, Material::Kind> kinds;
+  for (const Material& material : scene.materials)
+    kinds[material.name] = material.kind;
+  EXPECT_EQ(kinds.at("gold"), Material::Kind::kDiffuse);
+  EXPECT_EQ(kinds.at("coat"), Material::Kind::kDiffuse);
+  EXPECT_EQ(kinds.at("part"), Material::Kind::kCoatedDiffuse);
+  EXPECT_EQ(kinds.at("mix"), Material::Kind::kMix);
+  EXPECT_FALSE(HasSaturatedColors(scene));
+}
+
+// A small file cannot keep a coordinator and its workers busy with tables for hours.
+TEST(PbrtMaterialsTest, TooManyDifferentCoatsAreAnError) {
+  const auto world = [](int coats, bool differ) {
+    std::string text;
+    for (int i = 0; i < coats; ++i) {
+      text +=
+          "Material \"coatedconductor\" \"bool remaproughness\" false "
+          "\"float interface.roughness\" " +
+          std::to_string(differ ? 0.1 + 1e-4 * i : 0.1) + " Shape \"sphere\"\n";
+    }
+    return text;
+  };
+  EXPECT_THAT(SaidOfWorld(world(600, true)), HasSubstr("error: the tables of so many different"));
+  EXPECT_THAT(SaidOfWorld(world(400, true)), Not(HasSubstr("error")));
+  EXPECT_THAT(SaidOfWorld(world(600, false)), Not(HasSubstr("error")));
 }
 
 // What a float texture that is declared by `text` as "t" is at a place.

@@ -20,14 +20,20 @@
 namespace lucerna {
 namespace {
 
-// Whether they are nowhere: no ray meets them, and they emit nothing. A light of alpha 0 is not: as
-// in pbrt-v4 it emits without being seen. One below 0 emits nothing there, and nothing here.
-bool IsNowhere(const ShapeSet& shapes, bool is_light) {
-  bool is_somewhere = false;
-  ForEachShapeTraits(shapes, [&](const ShapeTraits& traits) {
-    is_somewhere = is_somewhere || traits.alpha > 0 || (is_light && traits.alpha == 0);
-  });
-  return !is_somewhere;
+// Whether no ray meets any of them.
+bool IsInvisible(const ShapeSet& shapes) {
+  bool is_seen = false;
+  ForEachShapeTraits(shapes,
+                     [&](const ShapeTraits& traits) { is_seen = is_seen || traits.alpha > 0; });
+  return !is_seen;
+}
+
+// An emitter of alpha 0 emits without being seen, as in pbrt-v4; one below 0 emits nothing there.
+bool IsBelowZero(const ShapeSet& shapes) {
+  bool is_below = false;
+  ForEachShapeTraits(shapes,
+                     [&](const ShapeTraits& traits) { is_below = is_below || traits.alpha < 0; });
+  return is_below;
 }
 
 // Whether it is hair, or mixes it. Each material is looked at once: mixes of mixes double.
@@ -330,11 +336,11 @@ bool DirectiveReader::AddShape(Arguments& arguments, std::optional<TriangleMesh>
   if (IsOfHair(scene_.materials, state.material) && !IsTubesAlone(shapes)) {
     list.Error("has the material hair, which is for curves of type flat or cylinder alone");
   }
-  if (IsNowhere(shapes, is_light)) {
-    if (is_light && !diagnostics_.has_error())
-      list.Warning("alpha", "is below 0 everywhere: it emits no light");
+  if (is_light && IsBelowZero(shapes)) {
+    list.Warning("alpha", "is below 0 everywhere: it emits no light");
     return true;
   }
+  if (!is_light && IsInvisible(shapes)) return true;  // no ray meets it, and nothing comes from it
   if (!HasRoomFor(shapes, arguments)) return true;
   if (is_light && !diagnostics_.has_error() && !(shapes.Area() > 0))
     WarnOfLightWithoutArea(arguments.location(), list.subject(), diagnostics_);

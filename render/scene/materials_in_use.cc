@@ -1,0 +1,99 @@
+#include "render/scene/materials_in_use.h"
+
+#include <cstddef>
+#include <set>
+#include <string>
+#include <utility>
+
+#include "render/scene/coat_table.h"
+#include "render/scene/shape_lists.h"
+
+namespace lucerna {
+namespace {
+
+using Kind = Material::Kind;
+
+// Of one table, measured on scenes of 60 to 600 different coats.
+double SecondsOfCoat(const Material& material) {
+  if (material.kind == Kind::kCoatedConductor) return material.HasHaze() ? 0.15 : 0.12;
+  return material.HasHaze() ? 0.1 : 0.006;
+}
+constexpr double kSecondsBelowSurface = 0.035;
+
+}  // namespace
+
+std::vector<std::uint8_t> MaterialsInUse(const Scene& scene) {
+  std::vector<std::uint8_t> in_use(scene.materials.size());
+  ForEachShapeTraits(scene, [&](const ShapeTraits& traits) {
+    in_use[static_cast<std::size_t>(traits.material)] = 1;
+  });
+  // And which ones mixes choose from.
+  std::vector<std::int32_t> to_look_at;
+  for (std::size_t i = 0; i < in_use.size(); ++i) {
+    if (in_use[i] != 0) to_look_at.push_back(static_cast<std::int32_t>(i));
+  }
+  while (!to_look_at.empty()) {
+    const Material& material = scene.materials[static_cast<std::size_t>(to_look_at.back())];
+    to_look_at.pop_back();
+    if (material.kind != Kind::kMix) continue;
+    for (const std::int32_t part : material.mixed) {
+      if (std::exchange(in_use[static_cast<std::size_t>(part)], 1) == 0) to_look_at.push_back(part);
+    }
+  }
+  return in_use;
+}
+
+void DropUnusedMaterials(Scene& scene) {
+  const std::vector<std::uint8_t> in_use = MaterialsInUse(scene);
+  for (std::size_t i = 0; i < in_use.size(); ++i) {
+    if (in_use[i] != 0) continue;
+    Material plain;
+    plain.name = std::move(scene.materials[i].name);
+    scene.materials[i] = std::move(plain);
+  }
+}
+
+CoatNumbers CoatNumbersOf(const Material& material) {
+  const bool has_metal = material.kind == Kind::kCoatedConductor;
+  return {material.kind,
+          material.ior,
+          material.thickness,
+          material.alpha_u,
+          material.alpha_v,
+          has_metal ? material.base_alpha_u : 0,
+          has_metal ? material.base_alpha_v : 0,
+          has_metal || material.HasHaze() ? material.base_hits : 0,
+          material.HasHaze(),
+          material.HasHaze() ? material.phase_g : 0,
+          material.coat_passes_rest};
+}
+
+bool HasCoatTables(const Material& material) {
+  switch (material.kind) {
+    case Kind::kCoatedDiffuse:
+    case Kind::kSubsurface:
+      return true;
+    case Kind::kCoatedConductor:
+      // Smooth on smooth there is a closed form for all.
+      return !PropertiesOf(material).is_smooth;
+    default:
+      return false;
+  }
+}
+
+double SecondsOfTables(const std::vector<Material>& materials) {
+  std::set<std::pair<CoatNumbers, bool>> coats;
+  std::set<std::pair<float, float>> below;
+  double seconds = 0;
+  for (const Material& material : materials) {
+    if (!HasCoatTables(material)) continue;
+    const bool has_family = material.HasCoatTexture();
+    if (coats.emplace(CoatNumbersOf(material), has_family).second)
+      seconds += SecondsOfCoat(material) * (has_family ? CoatFamily::kTables : 1);
+    if (material.kind == Kind::kSubsurface && below.emplace(material.ior, material.phase_g).second)
+      seconds += kSecondsBelowSurface;
+  }
+  return seconds;
+}
+
+}  // namespace lucerna
