@@ -384,6 +384,36 @@ double MeanEntering(const Surface& surface) {
   return sum / (static_cast<double>(kSteps) * kSteps * kSteps * kSteps);
 }
 
+// One of some directions, evenly to all sides, by what the fibre scatters there (resampled
+// importance sampling, Talbot et al. 2005): of one such direction alone the weight would be 4 pi
+// times a lobe, which few paths meet.
+bool ScatterInHair(const ReferenceFibre& fibre, Double3 wo, const std::array<double, 3>& u,
+                   Scattered& out) {
+  constexpr int kDirections = 64;
+  constexpr double kGolden = 0.6180339887498949;
+  std::array<Double3, kDirections> directions;
+  std::array<Color, kDirections> shares;
+  std::array<double, kDirections> sums{};
+  double sum = 0;
+  for (std::size_t i = 0; i < kDirections; ++i) {
+    const auto number = static_cast<double>(i);
+    const double cosine = 1 - 2 * std::fmod(u[1] + number / kDirections, 1.0);
+    const double sine = std::sqrt(std::max(0.0, 1 - cosine * cosine));
+    const double phi = 2 * kPi64 * (u[2] + number * kGolden);
+    directions[i] = {sine * std::cos(phi), sine * std::sin(phi), cosine};
+    shares[i] = ReferenceHairShare(fibre, wo, directions[i]);
+    sum += shares[i][0] + shares[i][1] + shares[i][2];
+    sums[i] = sum;
+  }
+  if (!(sum > 0)) return false;
+  const auto drawn = static_cast<std::size_t>(std::min<std::ptrdiff_t>(
+      std::ranges::upper_bound(sums, u[0] * sum) - sums.begin(), kDirections - 1));
+  const double weight = sums[drawn] - (drawn > 0 ? sums[drawn - 1] : 0);
+  out.wi = directions[drawn];
+  out.weight = Times(shares[drawn], 4 * kPi64 * sum / (kDirections * weight));
+  return true;
+}
+
 // In the shading frame. False: absorbed.
 bool Scatter(const Surface& surface, Double3 wo, const std::array<double, 3>& u, Scattered& out) {
   if (wo.z == 0) return false;
@@ -398,15 +428,7 @@ bool Scatter(const Surface& surface, Double3 wo, const std::array<double, 3>& u,
     out.weight = surface.reflectance;
     return true;
   }
-  if (surface.kind == Material::Kind::kHair) {
-    // Evenly to all sides.
-    const double cosine = 1 - 2 * u[1];
-    const double sine = std::sqrt(1 - cosine * cosine);
-    const double phi = 2 * kPi64 * u[2];
-    out.wi = {sine * std::cos(phi), sine * std::sin(phi), cosine};
-    out.weight = Times(ReferenceHairShare(surface.fibre, wo, out.wi), 4 * kPi64);
-    return true;
-  }
+  if (surface.kind == Material::Kind::kHair) return ScatterInHair(surface.fibre, wo, u, out);
   if (surface.kind == Material::Kind::kCoatedDiffuse)
     return ScatterInCoat(surface, up, side, u, out);
   if (surface.kind == Material::Kind::kCoatedConductor) {
