@@ -1,5 +1,6 @@
 #include "render/scene/materials_in_use.h"
 
+#include <algorithm>
 #include <cstddef>
 #include <set>
 #include <string>
@@ -13,10 +14,15 @@ namespace {
 
 using Kind = Material::Kind;
 
-// Of one table, measured on scenes of 60 to 600 different coats.
+// Of one table, measured on scenes of 8 to 600 different coats. Walks through a layer that scatters
+// take longer the thicker it is, up to a bound; tables of stretched facets have rows.
 double SecondsOfCoat(const Material& material) {
-  if (material.kind == Kind::kCoatedConductor) return material.HasHaze() ? 0.15 : 0.12;
-  return material.HasHaze() ? 0.1 : 0.006;
+  const double rows =
+      material.alpha_u != material.alpha_v || material.base_alpha_u != material.base_alpha_v ? 3
+                                                                                             : 1;
+  const double facets = (material.kind == Kind::kCoatedConductor ? 0.12 : 0.006) * rows;
+  if (!material.HasHaze()) return facets;
+  return facets + std::min(1.0, 0.1 + 0.4 * static_cast<double>(material.thickness));
 }
 constexpr double kSecondsBelowSurface = 0.035;
 
