@@ -264,7 +264,7 @@ StatusOr<std::unique_ptr<JobEstimator>> JobEstimator::Create(Scene scene, Render
   LUCERNA_RETURN_IF_ERROR(CheckPower(prepared.lights().TotalPower()));
   state->tracer =
       std::make_unique<EyePathTracer>(prepared.scene(), state->settings, prepared.needs(),
-                                      prepared.intersector(), prepared.lights());
+                                      prepared.intersector(), prepared.lights(), threads);
   state->film_spread = std::make_unique<FilmSpread>(*state->tracer);
   const auto initial = static_cast<float>(settings.initial_radius > 0
                                               ? settings.initial_radius / prepared.scene().unit
@@ -297,7 +297,7 @@ StatusOr<EyePass> JobEstimator::TraceEyePaths(std::uint64_t pass, const EyePathC
     LUCERNA_ASSIGN_OR_RETURN(const std::unique_ptr<PreparedScene> then,
                              state_->prepared.At(TimeOfPass(motion, state_->settings.seed, pass)));
     const EyePathTracer tracer(then->scene(), state_->settings, then->needs(), then->intersector(),
-                               then->lights());
+                               then->lights(), state_->team.threads());
     FilmSpread spread(tracer);
     if (needs().Uses(Part::kSpectra)) spread.Prepare(state_->team);
     const PreparedScene::AtPass at_pass(*then, state_->settings.seed, pass);

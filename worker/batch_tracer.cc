@@ -226,7 +226,7 @@ Status CheckDeposits(const std::vector<BatchTally>& tallies) {
 struct BatchTracer::State {
   State(Scene s, int threads)
       : prepared(std::move(s), threads),
-        features(std::in_place, prepared.scene()),
+        features(std::in_place, prepared.scene(), threads),
         time_of_features(prepared.time()),
         team(threads) {}
 
@@ -237,7 +237,7 @@ struct BatchTracer::State {
     spectra.reset();
     eye_paths.reset();
     LUCERNA_RETURN_IF_ERROR(prepared.PrepareFor(needs, time));
-    if (time_of_features != time) features.emplace(prepared.scene());
+    if (time_of_features != time) features.emplace(prepared.scene(), team.threads());
     time_of_features = time;
     return absl::OkStatus();
   }
@@ -246,8 +246,9 @@ struct BatchTracer::State {
   void PrepareEyePaths(const RenderSettings& settings) {
     if (eye_paths != nullptr && eye_settings == settings) return;
     eye_settings = settings;
-    eye_paths = std::make_unique<EyePathTracer>(prepared.scene(), eye_settings, prepared.needs(),
-                                                prepared.intersector(), prepared.lights());
+    eye_paths =
+        std::make_unique<EyePathTracer>(prepared.scene(), eye_settings, prepared.needs(),
+                                        prepared.intersector(), prepared.lights(), team.threads());
     film_spread.emplace(*eye_paths);
     if (prepared.needs().Uses(Part::kSpectra)) film_spread->Prepare(team);
     first_hits.emplace(prepared.needs().eye_sample_sets(),

@@ -64,7 +64,7 @@ StatusOr<MeshRender> RenderFromMesh(const Scene& scene, const RenderSettings& se
   PreparedScene prepared(scene, threads);
   LUCERNA_RETURN_IF_ERROR(prepared.PrepareFor(needs));
   const EyePathTracer tracer(prepared.scene(), settings, prepared.needs(), prepared.intersector(),
-                             prepared.lights(),
+                             prepared.lights(), threads,
                              mesh.is_indirect ? EyePathTracer::DirectLight::kEverywhere
                                               : EyePathTracer::DirectLight::kWherePathsGoOn);
   FilmSpread spread(tracer);

@@ -28,7 +28,7 @@ bool LieOnOneSide(const Triangle& triangle, std::span<const Vec3> points, double
   return lowest > limit || highest < -limit;
 }
 
-// Triangles of all meshes that count, by their welded corners.
+// Triangles of all meshes that count, each once.
 struct Walls {
   std::vector<Vec3> positions;
   std::vector<std::uint32_t> corners;  // [triangles × 3]
@@ -41,19 +41,13 @@ struct Walls {
 };
 
 Walls WallsOf(const Scene& scene, const MaterialPredicate& is_wall) {
+  WeldedTriangles all = WeldMeshes(scene.meshes, [&](const TriangleMesh& mesh) {
+    return IsWhole(mesh.traits) && mesh.traits.motion == kNoMotion &&
+           is_wall(scene.materials[static_cast<std::size_t>(mesh.traits.material)]);
+  });
+  const std::vector<std::uint32_t>& corners = all.corners;
   Walls walls;
-  std::vector<std::uint32_t> corners;
-  for (const TriangleMesh& mesh : scene.meshes) {
-    if (!IsWhole(mesh.traits) || mesh.traits.motion != kNoMotion) continue;
-    if (!is_wall(scene.materials[static_cast<std::size_t>(mesh.traits.material)])) continue;
-    const auto first = static_cast<std::uint32_t>(walls.positions.size());
-    walls.positions.insert(walls.positions.end(), mesh.positions.begin(), mesh.positions.end());
-    for (const std::uint32_t index : mesh.indices)
-      corners.push_back(first + index);
-  }
-  const std::vector<std::uint32_t> welded = WeldVertices(walls.positions, {});
-  for (std::uint32_t& corner : corners)
-    corner = welded[corner];
+  walls.positions = std::move(all.positions);
   // The same triangle twice is one wall.
   std::vector<std::pair<std::array<std::uint32_t, 3>, std::uint32_t>> sorted;
   sorted.reserve(corners.size() / 3);

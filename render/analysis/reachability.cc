@@ -24,6 +24,10 @@ constexpr std::size_t kFewTriangles = 64;
 // How many shapes are tried for a line of sight to a light, before all are tested.
 constexpr std::size_t kFewPlaces = 8;
 
+// Building a tree takes as long as some twenty tests of all triangles, and a light takes two, or up
+// to eight.
+constexpr std::size_t kFewLights = 4;
+
 // Where a light, or the camera, is: points and boxes to be tested against closed surfaces.
 class LightExtent {
  public:
@@ -121,15 +125,22 @@ bool IsOpaque(const Material& material) {
 // The shapes of the materials that some predicate accepts, as rays meet them.
 class WallRays {
  public:
+  // Of meshes a tree is built where it takes less time than trying all triangles for each of so
+  // many lights. Keeps a reference to the scene.
   // Errors: those of Intersector::Create.
   static StatusOr<std::unique_ptr<WallRays>> Create(const Scene& scene,
-                                                    const MaterialPredicate& is_wall) {
+                                                    const MaterialPredicate& is_wall,
+                                                    std::size_t lights) {
     std::unique_ptr<WallRays> walls(new WallRays);
     const auto accepts = [&](const ShapeTraits& traits) {
       return IsWhole(traits) && is_wall(scene.materials[static_cast<std::size_t>(traits.material)]);
     };
     for (const TriangleMesh& mesh : scene.meshes) {
       if (!accepts(mesh.traits)) continue;
+      if (lights <= kFewLights) {
+        walls->tried_.push_back(&mesh);
+        continue;
+      }
       TriangleMesh& wall = walls->shapes_.meshes.emplace_back();
       wall.positions = mesh.positions;
       wall.indices = mesh.indices;
@@ -171,10 +182,31 @@ class WallRays {
     return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)};
   }
   [[nodiscard]] bool IsMet(Vec3 from, Double3 direction, double length) const {
-    return intersector_->Occluded({from, ToFloat(direction), static_cast<float>(length)});
+    if (intersector_->Occluded({from, ToFloat(direction), static_cast<float>(length)})) return true;
+    const Axes line(direction.x, direction.y, direction.z);
+    return std::ranges::any_of(tried_, [&](const TriangleMesh* mesh) {
+      for (std::size_t i = 0; i < mesh->indices.size() / 3; ++i) {
+        if (MayMeet(line, Double3(from), length, TriangleOf(*mesh, i))) return true;
+      }
+      return false;
+    });
+  }
+  // No is certain.
+  static bool MayMeet(const Axes& line, Double3 from, double length, const Triangle& triangle) {
+    std::array<Double3, 3> corners;
+    for (std::size_t k = 0; k < 3; ++k)
+      corners[k] = line.In(Double3(triangle[k]) - from);
+    double along = 0;
+    const Crossing crossing = CrossingOf(corners, along);
+    if (crossing == Crossing::kNone) return false;
+    // At an edge only that the line is met between the corners is known.
+    const auto [lowest, highest] = std::minmax({corners[0].z, corners[1].z, corners[2].z});
+    const bool is_once = crossing == Crossing::kOnce;
+    return (is_once ? along : highest) >= 0 && (is_once ? along : lowest) <= length;
   }
 
-  Scene shapes_;
+  std::vector<const TriangleMesh*> tried_;
+  Scene shapes_;  // all others
   std::unique_ptr<Intersector> intersector_;
 };
 
@@ -187,7 +219,7 @@ std::vector<std::uint32_t> FindSeparated(const Scene& scene,
       scene.camera.kind == Camera::Kind::kSensors || scene.motion.of_camera) {
     return {};
   }
-  const auto walls = WallRays::Create(scene, IsOpaque);
+  const auto walls = WallRays::Create(scene, IsOpaque, lights.size());
   if (!walls.ok()) return {};
   const Vec3 eye = scene.camera.camera_to_world.Point({});
   std::vector<const NumberedLight*> candidates;
@@ -273,7 +305,7 @@ bool ScattersNarrowly(const Material& material) {
 std::vector<std::uint32_t> FindWithoutLineOfSight(const Scene& scene,
                                                   const std::vector<NumberedLight>& lights,
                                                   const std::vector<std::uint32_t>& but) {
-  const auto walls = WallRays::Create(scene, ScattersNarrowly);
+  const auto walls = WallRays::Create(scene, ScattersNarrowly, lights.size());
   if (!walls.ok()) return {};
   // Some points where they would be sampled.
   std::vector<Vec3> lit;

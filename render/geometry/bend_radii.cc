@@ -8,6 +8,7 @@
 #include <limits>
 #include <type_traits>
 
+#include "render/base/parallel.h"
 #include "render/geometry/feature_edges.h"
 #include "render/geometry/shape_geometry.h"
 #include "render/math/double3.h"
@@ -65,7 +66,10 @@ Facet FacetOf(const std::array<Double3, 3>& corners) {
   return facet;
 }
 
-std::vector<float> RadiiOfFacets(const TriangleMesh& mesh) {
+// Of pieces that threads share.
+constexpr std::size_t kTrianglesPerPiece = std::size_t{1} << 14;
+
+std::vector<float> RadiiOfFacets(const TriangleMesh& mesh, ThreadTeam& team) {
   const std::size_t triangles = mesh.indices.size() / 3;
   // Scenes beyond that are refused elsewhere.
   if (mesh.indices.size() >= std::numeric_limits<std::uint32_t>::max()) return {};
@@ -83,8 +87,10 @@ std::vector<float> RadiiOfFacets(const TriangleMesh& mesh) {
                       Double3(mesh.positions[corner[2]])};
   };
   std::vector<Facet> facets(triangles);
-  for (std::size_t i = 0; i < triangles; ++i)
-    facets[i] = FacetOf(corners_of(i));
+  team.For(triangles, kTrianglesPerPiece, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i)
+      facets[i] = FacetOf(corners_of(i));
+  });
   // The corners of triangles at each vertex.
   for (const std::uint32_t vertex : corners)
     ++first[vertex + 1];
@@ -100,10 +106,9 @@ std::vector<float> RadiiOfFacets(const TriangleMesh& mesh) {
     return std::span<const std::uint32_t>(around).subspan(begin, end - begin);
   };
 
-  std::vector<float> radii(triangles, HUGE_VALF);
-  for (std::size_t i = 0; i < triangles; ++i) {
+  const auto radius_of = [&](std::size_t i) {
     const Double3 own(facets[i].normal);
-    if (!(Dot(own, own) > 0)) continue;
+    if (!(Dot(own, own) > 0)) return HUGE_VALF;
     std::array<Double3, 3> normals;
     float rounding = facets[i].rounding;
     for (std::size_t c = 0; c < 3; ++c) {
@@ -121,16 +126,22 @@ std::vector<float> RadiiOfFacets(const TriangleMesh& mesh) {
       }
       normals[c] = normals[c] * (1 / Length(normals[c]));
     }
-    radii[i] = RadiusOf(corners_of(i), normals, 2 * static_cast<double>(rounding));
-  }
+    return RadiusOf(corners_of(i), normals, 2 * static_cast<double>(rounding));
+  };
+  std::vector<float> radii(triangles);
+  team.For(triangles, kTrianglesPerPiece, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i)
+      radii[i] = radius_of(i);
+  });
   const bool is_flat = std::ranges::all_of(radii, [](float r) { return r == HUGE_VALF; });
   return is_flat ? std::vector<float>() : radii;
 }
 
-std::vector<std::vector<float>> RadiiOfAll(const std::vector<TriangleMesh>& meshes) {
+std::vector<std::vector<float>> RadiiOfAll(const std::vector<TriangleMesh>& meshes, int threads) {
+  ThreadTeam team(threads);
   std::vector<std::vector<float>> radii(meshes.size());
   for (std::size_t i = 0; i < meshes.size(); ++i) {
-    if (HasFacets(meshes[i])) radii[i] = RadiiOfFacets(meshes[i]);
+    if (HasFacets(meshes[i])) radii[i] = RadiiOfFacets(meshes[i], team);
   }
   return radii;
 }
@@ -152,10 +163,10 @@ bool HasFacets(const TriangleMesh& mesh) {
   return false;
 }
 
-BendRadii::BendRadii(const Scene& scene)
+BendRadii::BendRadii(const Scene& scene, int threads)
     : scene_(scene),
-      of_meshes_(RadiiOfAll(scene.meshes)),
-      of_object_meshes_(RadiiOfAll(scene.object_meshes)) {}
+      of_meshes_(RadiiOfAll(scene.meshes, threads)),
+      of_object_meshes_(RadiiOfAll(scene.object_meshes, threads)) {}
 
 float BendRadii::AtFacet(const OfFacets& facets, const TriangleMesh& mesh,
                          const SurfacePoint& point) const {

@@ -21,8 +21,9 @@ namespace lucerna {
 class BendRadii {
  public:
   // Prepares the meshes that have facets: 4 bytes a triangle are kept of those that are not flat,
-  // and some 50 taken meanwhile. Keeps a reference to `scene`, which must not change.
-  explicit BendRadii(const Scene& scene);
+  // and some 50 taken meanwhile. Keeps a reference to `scene`, which must not change. Threads as
+  // ThreadTeam has them; the result does not depend on them.
+  explicit BendRadii(const Scene& scene, int threads = 1);
 
   // The least radius of curvature of the surface at the point, of any direction and either side.
   // HUGE_VALF where the surface is flat. Threads: any.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <span>
 #include <type_traits>
 #include <utility>
@@ -17,6 +18,9 @@
 
 namespace lucerna {
 namespace {
+
+// Into which work is cut that threads share.
+constexpr std::size_t kPieces = 256;
 
 // Whether a surface goes on across an edge: two faces, or several that lie on each other, that
 // leave it in nearly opposite directions.
@@ -38,23 +42,8 @@ bool IsSmooth(std::span<const Double3> wings) {
 
 }  // namespace
 
-FeatureEdges::FeatureEdges(const Scene& scene) {
-  AddMeshEdges(scene);
-  ForEachAnalyticShape(scene, [&](const auto& shape) {
-    if constexpr (!std::decay_t<decltype(shape)>::kIsClosed) AddRim(shape, segments_);
-  });
-  const std::vector<FeatureSegment> crossings = SurfaceCrossings(scene);
-  segments_.insert(segments_.end(), crossings.begin(), crossings.end());
-  for (const auto& border : scene.sensor_borders)
-    segments_.push_back({border});
-  BuildTree();
-}
-
-FeatureEdges::FeatureEdges(std::vector<FeatureSegment> segments) : segments_(std::move(segments)) {
-  BuildTree();
-}
-
-void FeatureEdges::AddMeshEdges(const Scene& scene) {
+FeatureEdges::FeatureEdges(const Scene& scene, int threads) {
+  ThreadTeam team(threads);
   std::size_t vertex_count = 0;
   std::size_t corner_count = 0;
   for (const TriangleMesh& mesh : scene.meshes) {
@@ -62,41 +51,58 @@ void FeatureEdges::AddMeshEdges(const Scene& scene) {
     corner_count += mesh.indices.size();
   }
   // Scenes beyond that are refused elsewhere, or have discs that are not cut.
-  if (std::max(vertex_count, corner_count) >= std::numeric_limits<std::uint32_t>::max()) return;
-  std::vector<Vec3> positions;
-  positions.reserve(vertex_count);
-  std::vector<std::uint32_t> corners;
-  corners.reserve(corner_count);
+  const bool is_too_large =
+      std::max(vertex_count, corner_count) >= std::numeric_limits<std::uint32_t>::max();
+  {
+    const WeldedTriangles triangles = is_too_large ? WeldedTriangles{} : WeldMeshes(scene.meshes);
+    AddMeshEdges(scene, triangles, team);
+    ForEachAnalyticShape(scene, [&](const auto& shape) {
+      if constexpr (!std::decay_t<decltype(shape)>::kIsClosed) AddRim(shape, segments_);
+    });
+    if (!is_too_large) {
+      const std::vector<FeatureSegment> crossings = SurfaceCrossings(scene, triangles);
+      segments_.insert(segments_.end(), crossings.begin(), crossings.end());
+    }
+  }
+  for (const auto& border : scene.sensor_borders)
+    segments_.push_back({border});
+  BuildTree(team);
+}
+
+FeatureEdges::FeatureEdges(std::vector<FeatureSegment> segments) : segments_(std::move(segments)) {
+  ThreadTeam team(1);
+  BuildTree(team);
+}
+
+void FeatureEdges::AddMeshEdges(const Scene& scene, const WeldedTriangles& triangles,
+                                ThreadTeam& team) {
+  const std::vector<Vec3>& positions = triangles.positions;
+  const std::vector<std::uint32_t>& corners = triangles.corners;
   std::vector<std::size_t> kept_begin;  // triangles at which meshes begin, and whether photons stay
   std::vector<bool> keeps;
+  std::size_t begin = 0;
   for (const TriangleMesh& mesh : scene.meshes) {
-    kept_begin.push_back(corners.size() / 3);
+    kept_begin.push_back(begin);
     keeps.push_back(Gathers(scene.materials[static_cast<std::size_t>(mesh.traits.material)]));
-    const auto first = static_cast<std::uint32_t>(positions.size());
-    positions.insert(positions.end(), mesh.positions.begin(), mesh.positions.end());
-    for (const std::uint32_t index : mesh.indices)
-      corners.push_back(first + index);
+    begin += mesh.indices.size() / 3;
   }
   const bool is_mixed = std::ranges::adjacent_find(keeps, std::not_equal_to<>()) != keeps.end();
   const auto keeps_photons = [&](std::uint32_t triangle) {
     const auto next = std::ranges::upper_bound(kept_begin, std::size_t{triangle});
     return keeps[static_cast<std::size_t>(next - kept_begin.begin() - 1)];
   };
-  {
-    const std::vector<std::uint32_t> welded = WeldVertices(positions, {});
-    for (std::uint32_t& corner : corners)
-      corner = welded[corner];
-  }
   const std::vector<TriangleSide> all_sides = SidesByEdge(corners, positions.size());
   for (const auto& [low, high] : CrestsOfRoundedBorders(positions, corners, all_sides))
     segments_.push_back({{positions[low], positions[high]}});
-  std::vector<Double3> wings;
-  ForEachEdge(all_sides, [&](std::span<const TriangleSide> sides) {
+
+  // The segment of an edge at which discs are cut.
+  const auto feature_of = [&](std::span<const TriangleSide> sides,
+                              std::vector<Double3>& wings) -> std::optional<FeatureSegment> {
     const FeatureSegment segment = {{positions[sides[0].low], positions[sides[0].high]}};
     const Double3 end(segment.ends[0]);
     const Double3 along = Double3(segment.ends[1]) - end;
     const double squared = Dot(along, along);
-    if (!(squared > 0)) return;
+    if (!(squared > 0)) return std::nullopt;
     wings.clear();
     bool is_border = false;
     for (const TriangleSide& side : sides) {
@@ -108,43 +114,84 @@ void FeatureEdges::AddMeshEdges(const Scene& scene) {
       wings.push_back(wing * (1 / length));
       is_border |= is_mixed && keeps_photons(side.triangle()) != keeps_photons(sides[0].triangle());
     }
-    if (wings.empty()) return;
-    if (is_border || !IsSmooth(wings)) segments_.push_back(segment);
+    if (wings.empty() || (!is_border && IsSmooth(wings))) return std::nullopt;
+    return segment;
+  };
+  const std::vector<std::size_t> pieces = CutBetweenEdges(all_sides, kPieces);
+  std::vector<std::vector<FeatureSegment>> found(pieces.size() - 1);
+  team.For(found.size(), 1, [&](std::size_t first, std::size_t last) {
+    std::vector<Double3> wings;
+    for (std::size_t i = first; i < last; ++i) {
+      ForEachEdge(std::span(all_sides).subspan(pieces[i], pieces[i + 1] - pieces[i]),
+                  [&](std::span<const TriangleSide> sides) {
+                    if (const auto segment = feature_of(sides, wings)) found[i].push_back(*segment);
+                  });
+    }
   });
+  for (const std::vector<FeatureSegment>& of_piece : found)
+    segments_.insert(segments_.end(), of_piece.begin(), of_piece.end());
 }
 
 namespace {
 
-// Sorts segments so that each eight that follow each other are near each other, each eight of such
-// groups too, and so on.
-void Arrange(std::span<FeatureSegment> segments, std::size_t lanes) {
-  if (segments.size() <= lanes) return;
+// Puts the segments that lie lower along the widest axis before the others, and returns how many
+// those are: about a half, in whole groups of `lanes`, of groups of such groups, and so on. 0 of so
+// few that they are one group.
+std::size_t Halve(std::span<FeatureSegment> segments, std::size_t lanes) {
+  if (segments.size() <= lanes) return 0;
   std::size_t of_child = lanes;
   while (of_child * lanes < segments.size())
     of_child *= lanes;
   const std::size_t children = (segments.size() + of_child - 1) / of_child;
-  const auto half = static_cast<std::ptrdiff_t>(children / 2 * of_child);
+  const std::size_t half = children / 2 * of_child;
   const auto middle = [](const FeatureSegment& s) { return s.ends[0] * 0.5F + s.ends[1] * 0.5F; };
   Bounds bounds;
   for (const FeatureSegment& segment : segments)
     bounds.Add(middle(segment));
   const Vec3 size = bounds.high - bounds.low;
   const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
-  std::nth_element(segments.begin(), segments.begin() + half, segments.end(),
-                   [&](const FeatureSegment& a, const FeatureSegment& b) {
+  std::nth_element(segments.begin(), segments.begin() + static_cast<std::ptrdiff_t>(half),
+                   segments.end(), [&](const FeatureSegment& a, const FeatureSegment& b) {
                      return middle(a)[axis] < middle(b)[axis];
                    });
-  const auto first = static_cast<std::size_t>(half);
-  Arrange(segments.first(first), lanes);
-  Arrange(segments.subspan(first), lanes);
+  return half;
+}
+
+// Sorts segments so that each eight that follow each other are near each other, each eight of such
+// groups too, and so on.
+void Arrange(std::span<FeatureSegment> segments, std::size_t lanes) {
+  const std::size_t half = Halve(segments, lanes);
+  if (half == 0) return;
+  Arrange(segments.first(half), lanes);
+  Arrange(segments.subspan(half), lanes);
+}
+
+// The same. The first halves are those of all segments, so all threads take part from then on.
+void Arrange(std::span<FeatureSegment> segments, std::size_t lanes, ThreadTeam& team) {
+  std::vector<std::span<FeatureSegment>> parts = {segments};
+  while (parts.size() < kPieces) {
+    std::vector<std::span<FeatureSegment>> halves(2 * parts.size());
+    team.For(parts.size(), 1, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) {
+        const std::size_t half = Halve(parts[i], lanes);
+        halves[2 * i] = parts[i].first(half);
+        halves[2 * i + 1] = parts[i].subspan(half);
+      }
+    });
+    parts = std::move(halves);
+  }
+  team.For(parts.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i)
+      Arrange(parts[i], lanes);
+  });
 }
 
 }  // namespace
 
-void FeatureEdges::BuildTree() {
+void FeatureEdges::BuildTree(ThreadTeam& team) {
   if (segments_.empty()) return;
   segments_.shrink_to_fit();
-  Arrange(segments_, kLanes);
+  Arrange(segments_, kLanes, team);
   const auto set = [](Lanes& lanes, std::size_t lane, Vec3 low, Vec3 high) {
     for (int axis = 0; axis < 3; ++axis) {
       lanes.low[static_cast<std::size_t>(axis)][lane] = low[axis];

@@ -28,8 +28,10 @@
 #include <span>
 #include <vector>
 
+#include "render/base/parallel.h"
 #include "render/geometry/surface_crossings.h"
 #include "render/math/vector.h"
+#include "render/scene/mesh_edges.h"
 #include "render/scene/scene.h"
 
 namespace lucerna {
@@ -51,7 +53,8 @@ struct DiscSlab {
 // triangle of the scene.
 class FeatureEdges {
  public:
-  explicit FeatureEdges(const Scene& scene);
+  // Threads as ThreadTeam has them; the result does not depend on them.
+  explicit FeatureEdges(const Scene& scene, int threads = 1);
   // For tests.
   explicit FeatureEdges(std::vector<FeatureSegment> segments);
 
@@ -105,8 +108,8 @@ class FeatureEdges {
     std::array<std::array<float, kLanes>, 3> low, high;
   };
 
-  void AddMeshEdges(const Scene& scene);
-  void BuildTree();
+  void AddMeshEdges(const Scene& scene, const WeldedTriangles& triangles, ThreadTeam& team);
+  void BuildTree(ThreadTeam& team);
   // A bit for each that is near.
   [[nodiscard]] static unsigned int SegmentsNear(const Lanes& segments, const DiscSlab& slab);
   [[nodiscard]] static unsigned int BoxesNear(const Lanes& boxes, const DiscSlab& slab);

@@ -19,6 +19,8 @@ constexpr std::size_t kMostSegments = std::size_t{1} << 22;
 // Pairs of shapes whose boxes overlap, and per shape so many of boxes of the tree.
 constexpr std::uint64_t kPairsPerShape = 256;
 constexpr std::size_t kShapesPerLeaf = 4;
+// With fewer on average a tree of the surfaces is no help.
+constexpr std::size_t kShapesPerSurface = 8;
 constexpr std::uint32_t kMixed = std::numeric_limits<std::uint32_t>::max();
 
 struct Shape {
@@ -73,70 +75,31 @@ std::optional<Span> CutByPlane(const Triangle& triangle, Double3 origin, Double3
   return span;
 }
 
-class Crossings {
+// Shapes in a binary tree of boxes, which sorts them.
+class ShapeTree {
  public:
-  explicit Crossings(const Scene& scene) : scene_(scene) {}
-
-  std::vector<FeatureSegment> Find() {
-    if (!AddShapes() || shapes_.size() < 2) return {};
+  // Of at least one shape.
+  explicit ShapeTree(std::vector<Shape> shapes) : shapes_(std::move(shapes)) {
     nodes_.reserve(2 * shapes_.size());
     Build(0, static_cast<std::uint32_t>(shapes_.size()));
-    // One surface alone has nothing to cross.
-    if (nodes_[0].surface != kMixed) return {};
-    most_pairs_ = kPairsPerShape * shapes_.size() + (std::uint64_t{1} << 20);
-    Within(0);
-    if (most_pairs_ == 0) return {};
-    return std::move(segments_);
+  }
+
+  [[nodiscard]] const std::vector<Shape>& shapes() const { return shapes_; }
+  // The first is that of all shapes.
+  [[nodiscard]] const std::vector<Node>& nodes() const { return nodes_; }
+
+  // Whether the box of a shape of another surface overlaps that of `shape`.
+  [[nodiscard]] bool IsNearOther(const Shape& shape, std::uint32_t number = 0) const {
+    const Node& node = nodes_[number];
+    if (node.surface == shape.surface || !Overlap(node.bounds, shape.bounds)) return false;
+    if (node.left != 0) return IsNearOther(shape, node.left) || IsNearOther(shape, node.right);
+    return std::any_of(
+        shapes_.begin() + node.begin, shapes_.begin() + node.end, [&](const Shape& other) {
+          return other.surface != shape.surface && Overlap(other.bounds, shape.bounds);
+        });
   }
 
  private:
-  bool AddShapes() {
-    std::size_t vertex_count = 0;
-    std::size_t corner_count = 0;
-    for (const TriangleMesh& mesh : scene_.meshes) {
-      vertex_count += mesh.positions.size();
-      corner_count += mesh.indices.size();
-    }
-    const std::size_t analytic_count = ShapeCount(scene_) - scene_.meshes.size();
-    if (std::max(vertex_count, corner_count) + analytic_count >= kMixed) return false;
-    positions_.reserve(vertex_count);
-    corners_.reserve(corner_count);
-    for (const TriangleMesh& mesh : scene_.meshes) {
-      const auto first = static_cast<std::uint32_t>(positions_.size());
-      positions_.insert(positions_.end(), mesh.positions.begin(), mesh.positions.end());
-      for (const std::uint32_t index : mesh.indices)
-        corners_.push_back(first + index);
-    }
-    std::vector<std::uint32_t> welded = WeldVertices(positions_, {});
-    for (std::uint32_t& corner : corners_)
-      corner = welded[corner];
-    welded = ConnectedSurfaces(corners_, positions_.size());
-    std::uint32_t surfaces = 0;
-    shapes_.reserve(welded.size() + analytic_count);
-    for (std::uint32_t i = 0; i < welded.size(); ++i) {
-      Shape& shape = shapes_.emplace_back();
-      shape.surface = welded[i];
-      shape.index = i;
-      for (std::size_t k = 0; k < 3; ++k)
-        shape.bounds.Add(positions_[corners_[3 * std::size_t{i} + k]]);
-      surfaces = std::max(surfaces, welded[i] + 1);
-    }
-    std::uint8_t kind = 0;
-    ForEachAnalyticList(scene_, [&](const auto& list) {
-      using Kind = typename std::decay_t<decltype(list)>::value_type;
-      // What is thin ends no disc.
-      for (std::uint32_t i = 0; i < list.size() && !Kind::kIsThin; ++i) {
-        const Vec3 reach = {list[i].Reach(), list[i].Reach(), list[i].Reach()};
-        shapes_.push_back({{list[i].center - reach, list[i].center + reach},
-                           surfaces++,
-                           i,
-                           static_cast<ShapeKind>(kind)});
-      }
-      ++kind;
-    });
-    return true;
-  }
-
   // Halves at the middle shape along the widest axis of their centres.
   std::uint32_t Build(std::uint32_t begin, std::uint32_t end) {
     const auto number = static_cast<std::uint32_t>(nodes_.size());
@@ -168,15 +131,82 @@ class Crossings {
     return number;
   }
 
+  std::vector<Shape> shapes_;
+  std::vector<Node> nodes_;
+};
+
+class Crossings {
+ public:
+  Crossings(const Scene& scene, const WeldedTriangles& triangles)
+      : scene_(scene), positions_(triangles.positions), corners_(triangles.corners) {}
+
+  std::vector<FeatureSegment> Find() {
+    std::vector<Shape> shapes = Shapes();
+    if (shapes.size() < 2) return {};
+    most_pairs_ = kPairsPerShape * shapes.size() + (std::uint64_t{1} << 20);
+    DropThoseAlone(shapes);
+    if (shapes.empty()) return {};
+    const ShapeTree tree(std::move(shapes));
+    tree_ = &tree;
+    Within(0);
+    if (most_pairs_ == 0) return {};
+    return std::move(segments_);
+  }
+
+ private:
+  // Of all shapes, none where there are too many to number.
+  [[nodiscard]] std::vector<Shape> Shapes() {
+    const std::size_t analytic_count = ShapeCount(scene_) - scene_.meshes.size();
+    if (std::max(positions_.size(), corners_.size()) + analytic_count >= kMixed) return {};
+    const std::vector<std::uint32_t> surface_of = ConnectedSurfaces(corners_, positions_.size());
+    std::vector<Shape> shapes;
+    shapes.reserve(surface_of.size() + analytic_count);
+    for (std::uint32_t i = 0; i < surface_of.size(); ++i) {
+      Shape& shape = shapes.emplace_back();
+      shape.surface = surface_of[i];
+      shape.index = i;
+      for (std::size_t k = 0; k < 3; ++k)
+        shape.bounds.Add(positions_[corners_[3 * std::size_t{i} + k]]);
+      surfaces_ = std::max(surfaces_, surface_of[i] + 1);
+    }
+    std::uint8_t kind = 0;
+    ForEachAnalyticList(scene_, [&](const auto& list) {
+      using Kind = typename std::decay_t<decltype(list)>::value_type;
+      // What is thin ends no disc.
+      for (std::uint32_t i = 0; i < list.size() && !Kind::kIsThin; ++i) {
+        const Vec3 reach = {list[i].Reach(), list[i].Reach(), list[i].Reach()};
+        shapes.push_back({{list[i].center - reach, list[i].center + reach},
+                          surfaces_++,
+                          i,
+                          static_cast<ShapeKind>(kind)});
+      }
+      ++kind;
+    });
+    return shapes;
+  }
+
+  // Shapes that no other surface comes near, such as most of a ground on which objects stand: a
+  // tree of the surfaces is much smaller than one of all shapes.
+  void DropThoseAlone(std::vector<Shape>& shapes) const {
+    if (shapes.size() / kShapesPerSurface < surfaces_) return;
+    std::vector<Shape> surfaces(surfaces_);
+    for (std::uint32_t i = 0; i < surfaces_; ++i)
+      surfaces[i].surface = i;
+    for (const Shape& shape : shapes)
+      AddAll(surfaces[shape.surface].bounds, shape.bounds);
+    const ShapeTree tree(std::move(surfaces));
+    std::erase_if(shapes, [&](const Shape& shape) { return !tree.IsNearOther(shape); });
+  }
+
   [[nodiscard]] bool IsOver() const { return most_pairs_ == 0; }
 
   void Within(std::uint32_t number) {
-    const Node& node = nodes_[number];
+    const Node& node = tree_->nodes()[number];
     if (node.surface != kMixed || IsOver()) return;
     if (node.left == 0) {
       for (std::uint32_t i = node.begin; i < node.end; ++i) {
         for (std::uint32_t j = i + 1; j < node.end; ++j)
-          Cross(shapes_[i], shapes_[j]);
+          Cross(tree_->shapes()[i], tree_->shapes()[j]);
       }
       return;
     }
@@ -186,8 +216,8 @@ class Crossings {
   }
 
   void Between(std::uint32_t one, std::uint32_t other) {
-    const Node& a = nodes_[one];
-    const Node& b = nodes_[other];
+    const Node& a = tree_->nodes()[one];
+    const Node& b = tree_->nodes()[other];
     if (IsOver() || (a.surface != kMixed && a.surface == b.surface) ||
         !Overlap(a.bounds, b.bounds)) {
       return;
@@ -196,7 +226,7 @@ class Crossings {
     if (a.left == 0 && b.left == 0) {
       for (std::uint32_t i = a.begin; i < a.end; ++i) {
         for (std::uint32_t j = b.begin; j < b.end; ++j)
-          Cross(shapes_[i], shapes_[j]);
+          Cross(tree_->shapes()[i], tree_->shapes()[j]);
       }
     } else if (b.left == 0 || (a.left != 0 && a.end - a.begin >= b.end - b.begin)) {
       Between(a.left, other);
@@ -331,18 +361,18 @@ class Crossings {
   }
 
   const Scene& scene_;
-  std::vector<Vec3> positions_;
-  std::vector<std::uint32_t> corners_;
-  std::vector<Shape> shapes_;
-  std::vector<Node> nodes_;
+  const std::vector<Vec3>& positions_;
+  const std::vector<std::uint32_t>& corners_;
+  std::uint32_t surfaces_ = 0;
+  const ShapeTree* tree_ = nullptr;
   std::uint64_t most_pairs_ = 0;
   std::vector<FeatureSegment> segments_;
 };
 
 }  // namespace
 
-std::vector<FeatureSegment> SurfaceCrossings(const Scene& scene) {
-  return Crossings(scene).Find();
+std::vector<FeatureSegment> SurfaceCrossings(const Scene& scene, const WeldedTriangles& triangles) {
+  return Crossings(scene, triangles).Find();
 }
 
 }  // namespace lucerna

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "render/geometry/shape_geometry.h"
+#include "render/scene/mesh_edges.h"
 #include "render/scene/scene.h"
 
 namespace lucerna {
@@ -17,7 +18,9 @@ namespace lucerna {
 // plane do not cross; nor do two curved shapes, or two flat ones. Empty when there are more than a
 // few million, or too many pairs that come near each other: foliage. Depends on the scene alone.
 // Time: proportional to the shapes, times the logarithm of their number, and the pairs of surfaces
-// whose boxes overlap. Memory: about 100 bytes a shape while it works.
-[[nodiscard]] std::vector<FeatureSegment> SurfaceCrossings(const Scene& scene);
+// whose boxes overlap. Memory: 44 bytes a shape while it works, and 100 more for each to which the
+// box of another surface comes near. `triangles` are those of all meshes of the scene.
+[[nodiscard]] std::vector<FeatureSegment> SurfaceCrossings(const Scene& scene,
+                                                           const WeldedTriangles& triangles);
 
 }  // namespace lucerna

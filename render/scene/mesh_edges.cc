@@ -46,6 +46,33 @@ std::vector<std::uint32_t> WeldVertices(std::span<const Vec3> positions,
   return first;
 }
 
+WeldedTriangles WeldMeshes(const std::vector<TriangleMesh>& meshes,
+                           const std::function<bool(const TriangleMesh&)>& is_wanted) {
+  WeldedTriangles triangles;
+  std::size_t vertex_count = 0;
+  std::size_t corner_count = 0;
+  for (const TriangleMesh& mesh : meshes) {
+    if (!is_wanted(mesh)) continue;
+    vertex_count += mesh.positions.size();
+    corner_count += mesh.indices.size();
+  }
+  LUCERNA_CHECK(vertex_count < kEmpty);
+  triangles.positions.reserve(vertex_count);
+  triangles.corners.reserve(corner_count);
+  for (const TriangleMesh& mesh : meshes) {
+    if (!is_wanted(mesh)) continue;
+    const auto first = static_cast<std::uint32_t>(triangles.positions.size());
+    triangles.positions.insert(triangles.positions.end(), mesh.positions.begin(),
+                               mesh.positions.end());
+    for (const std::uint32_t index : mesh.indices)
+      triangles.corners.push_back(first + index);
+  }
+  const std::vector<std::uint32_t> welded = WeldVertices(triangles.positions, {});
+  for (std::uint32_t& corner : triangles.corners)
+    corner = welded[corner];
+  return triangles;
+}
+
 std::vector<std::uint32_t> ConnectedSurfaces(std::span<const std::uint32_t> corners,
                                              std::size_t vertex_count) {
   UnionFind surfaces(vertex_count);
@@ -96,6 +123,20 @@ std::vector<TriangleSide> SidesByEdge(std::span<const std::uint32_t> corners,
               });
   }
   return sides;
+}
+
+std::vector<std::size_t> CutBetweenEdges(std::span<const TriangleSide> sides, std::size_t most) {
+  std::vector<std::size_t> borders = {0};
+  for (std::size_t piece = 1; piece <= most; ++piece) {
+    std::size_t border = std::max(borders.back(), sides.size() / most * piece);
+    if (piece == most) border = sides.size();
+    while (border > 0 && border < sides.size() && sides[border].low == sides[border - 1].low &&
+           sides[border].high == sides[border - 1].high) {
+      ++border;
+    }
+    if (border > borders.back()) borders.push_back(border);
+  }
+  return borders;
 }
 
 }  // namespace lucerna

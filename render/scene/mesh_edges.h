@@ -6,10 +6,12 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <vector>
 
 #include "render/math/vector.h"
+#include "render/scene/scene.h"
 
 namespace lucerna {
 
@@ -17,6 +19,18 @@ namespace lucerna {
 // -0 equals 0. Requires as many normals as positions, or none; fewer than 2^32.
 [[nodiscard]] std::vector<std::uint32_t> WeldVertices(std::span<const Vec3> positions,
                                                       std::span<const Vec3> normals);
+
+// Triangles of several meshes as those of one.
+struct WeldedTriangles {
+  std::vector<Vec3> positions;         // of all vertices of all meshes, in order
+  std::vector<std::uint32_t> corners;  // [triangles × 3] WeldVertices by place of all of them
+
+  [[nodiscard]] std::size_t size() const { return corners.size() / 3; }
+};
+// Of the meshes that `is_wanted` accepts. Requires fewer than 2^32 vertices.
+[[nodiscard]] WeldedTriangles WeldMeshes(
+    const std::vector<TriangleMesh>& meshes,
+    const std::function<bool(const TriangleMesh&)>& is_wanted = [](const auto&) { return true; });
 
 // For each triangle the number of the surface it belongs to, from 0 in order of their first
 // triangles: triangles that share a welded vertex are of one surface. `corners` [triangles × 3] as
@@ -49,5 +63,10 @@ void ForEachEdge(std::span<const TriangleSide> sides, const Visit& visit) {
     visit(sides.subspan(begin, end - begin));
   }
 }
+
+// At most `most` pieces of about equal lengths into which no edge is cut: where they begin, in
+// order, and sides.size().
+[[nodiscard]] std::vector<std::size_t> CutBetweenEdges(std::span<const TriangleSide> sides,
+                                                       std::size_t most);
 
 }  // namespace lucerna

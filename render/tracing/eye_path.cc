@@ -138,7 +138,7 @@ Sensor PointOf(const SensorBucket& bucket, const Sensor& sensor, float u, float 
 
 EyePathTracer::EyePathTracer(const Scene& scene, const RenderSettings& settings,
                              const SceneNeeds& needs, const Intersector& intersector,
-                             const LightSet& lights, DirectLight direct_light)
+                             const LightSet& lights, int threads, DirectLight direct_light)
     : scene_(scene),
       settings_(settings),
       direct_light_(direct_light),
@@ -156,7 +156,7 @@ EyePathTracer::EyePathTracer(const Scene& scene, const RenderSettings& settings,
       media_(scene, intersector),
       filter_(scene.filter) {
   // Other radii do not ask.
-  if (settings.initial_radius == 0 && needs.Uses(Part::kPhotons)) bends_.emplace(scene);
+  if (settings.initial_radius == 0 && needs.Uses(Part::kPhotons)) bends_.emplace(scene, threads);
   // Readers let only invertible transforms pass.
   world_to_camera_ = scene.camera.camera_to_world.Inverse().value_or(Transform());
   const Window window = ScreenWindow(scene.camera, settings.width, settings.height);

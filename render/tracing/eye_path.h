@@ -85,9 +85,9 @@ class EyePathTracer {
     kEverywhere,
     kWherePathsGoOn,  // not where photons are gathered: something else knows all light there
   };
-  // Keeps references to all.
+  // Keeps references to all. Threads, as ThreadTeam has them, of the preparation alone.
   EyePathTracer(const Scene& scene, const RenderSettings& settings, const SceneNeeds& needs,
-                const Intersector& intersector, const LightSet& lights,
+                const Intersector& intersector, const LightSet& lights, int threads = 1,
                 DirectLight direct_light = DirectLight::kEverywhere);
 
   // What is known of the first thing that an eye path meets.

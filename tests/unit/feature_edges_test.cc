@@ -91,13 +91,17 @@ TEST(FeatureEdgesTest, OfADiskAreItsRims) {
   EXPECT_NEAR(LengthOf(FeatureEdges(scene)), 6 * std::numbers::pi, 1e-3);
 }
 
+std::vector<FeatureSegment> CrossingsOf(const Scene& scene) {
+  return SurfaceCrossings(scene, WeldMeshes(scene.meshes));
+}
+
 // A box that is sunk into the floor meets it in a square; one that stands on it does not.
 TEST(FeatureEdgesTest, AreWhereSurfacesPassThroughEachOther) {
   const auto crossings = [](float bottom, float size) {
     Scene scene = Empty();
     AddQuad(scene, {-4 * size, -5 * size, 0}, {8 * size, 0, 0}, {0, 9 * size, 0}, 0);
     AddBox(scene, {0, 0, bottom * size}, {size, 2 * size, 3 * size}, 0);
-    const std::vector<FeatureSegment> segments = SurfaceCrossings(scene);
+    const std::vector<FeatureSegment> segments = CrossingsOf(scene);
     double length = 0;
     for (const FeatureSegment& segment : segments) {
       for (const Vec3 end : segment.ends)
@@ -113,12 +117,43 @@ TEST(FeatureEdgesTest, AreWhereSurfacesPassThroughEachOther) {
   }
 }
 
+// Most triangles of the floor are alone.
+TEST(FeatureEdgesTest, AreWhereABoxIsSunkIntoAFloorOfManyTriangles) {
+  constexpr int kSquares = 64;
+  constexpr float kSide = 8.0F / kSquares;
+  const auto crossing_length = [](float bottom) {
+    Scene scene = Empty();
+    TriangleMesh& floor = scene.meshes.emplace_back();
+    for (int j = 0; j <= kSquares; ++j) {
+      for (int i = 0; i <= kSquares; ++i) {
+        floor.positions.push_back(
+            {-4.01F + kSide * static_cast<float>(i), -4.02F + kSide * static_cast<float>(j), 0});
+      }
+    }
+    for (std::uint32_t j = 0; j < kSquares; ++j) {
+      for (std::uint32_t i = 0; i < kSquares; ++i) {
+        const std::uint32_t at = j * (kSquares + 1) + i;
+        for (const std::uint32_t corner :
+             {at, at + 1, at + kSquares + 1, at + 1, at + kSquares + 2, at + kSquares + 1})
+          floor.indices.push_back(corner);
+      }
+    }
+    AddBox(scene, {0, 0, bottom}, {1, 2, 3}, 0);
+    double length = 0;
+    for (const FeatureSegment& segment : CrossingsOf(scene))
+      length += static_cast<double>(Length(segment.ends[1] - segment.ends[0]));
+    return length;
+  };
+  EXPECT_NEAR(crossing_length(-0.5F), 6, 1e-4);
+  EXPECT_EQ(crossing_length(0.5F), 0);
+}
+
 TEST(FeatureEdgesTest, AreTheCirclesOfSunkenBalls) {
   Scene scene = Empty();
   AddQuad(scene, {-4, -5, 0}, {8, 0, 0}, {0, 9, 0}, 0);
   AddSphere(scene, {0.3F, 0, 0.6F}, 1, 0);
   double length = 0;
-  for (const FeatureSegment& segment : SurfaceCrossings(scene)) {
+  for (const FeatureSegment& segment : CrossingsOf(scene)) {
     for (const Vec3 end : segment.ends) {
       // Around the circle, never inside.
       const double radius =
@@ -130,13 +165,13 @@ TEST(FeatureEdgesTest, AreTheCirclesOfSunkenBalls) {
   }
   EXPECT_NEAR(length, 2 * std::numbers::pi * 0.8, 1e-3);
   scene.spheres[0].center.z = 1;
-  EXPECT_TRUE(SurfaceCrossings(scene).empty()) << "it lies on the floor";
+  EXPECT_TRUE(CrossingsOf(scene).empty()) << "it lies on the floor";
   Scene disk = Empty();
   AddDisk(disk, {0, 0, 0}, {0, 0, 1}, 3, 0);
   AddSphere(disk, {0.3F, 0, 0.6F}, 1, 0);
-  EXPECT_EQ(SurfaceCrossings(disk).size(), 256U);
+  EXPECT_EQ(CrossingsOf(disk).size(), 256U);
   AddQuad(disk, {-1, -1, -1}, {0, 2, 0}, {0, 0, 2}, 0);
-  EXPECT_EQ(SurfaceCrossings(disk).size(), 256U + 2U) << "the two triangles of a wall";
+  EXPECT_EQ(CrossingsOf(disk).size(), 256U + 2U) << "the two triangles of a wall";
 }
 
 // Two blades that turn about each other cross where both planes meet.
@@ -179,7 +214,7 @@ TEST(FeatureEdgesTest, OfCrossingTrianglesLieInBoth) {
       sides += passes(0, corners[3 + k], corners[3 + (k + 1) % 3]) ? 1 : 0;
       sides += passes(3, corners[k], corners[(k + 1) % 3]) ? 1 : 0;
     }
-    const std::vector<FeatureSegment> segments = SurfaceCrossings(scene);
+    const std::vector<FeatureSegment> segments = CrossingsOf(scene);
     EXPECT_EQ(segments.size(), sides == 2 ? 1U : 0U) << trial;
     crossed += sides == 2 ? 1 : 0;
   }
