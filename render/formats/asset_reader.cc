@@ -78,8 +78,11 @@ StatusOr<std::shared_ptr<const MeasuredTable>> AssetReader::ReadMeasured(const s
 }
 
 StatusOr<std::shared_ptr<const Picture>> AssetReader::ReadPicture(const std::string& path,
-                                                                  const PixelEncoding& encoding,
+                                                                  const PixelEncoding& given,
                                                                   PictureUse use) {
+  PixelEncoding encoding = given;
+  encoding.is_of_all_files = reads_as_mitsuba_;
+  encoding.returned = use == PictureUse::kColors ? returned_ : 0;
   if (std::shared_ptr<const Picture> known = FindPicture(path, encoding, use)) return known;
   LUCERNA_ASSIGN_OR_RETURN(const std::string bytes, ReadBytes(path));
   StatusOr<std::shared_ptr<const Picture>> picture = Keep(path, bytes, path, encoding, use);

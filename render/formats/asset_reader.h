@@ -27,6 +27,13 @@ class AssetReader {
   // `files` outlives the reader.
   AssetReader(SceneFiles& files, const SceneLimits& limits) : files_(files), limits_(limits) {}
 
+  // From now on the encodings of pictures are those of all files, and colours are those below a
+  // coat (PixelEncoding).
+  void ReadPicturesAsMitsuba(double returned = 0) {
+    reads_as_mitsuba_ = true;
+    returned_ = returned;
+  }
+
   // From now on files are also looked for in this folder of the scene, before those that were added
   // earlier and before the main file's. Errors: RESOURCE_EXHAUSTED for too many.
   [[nodiscard]] Status AddFolder(std::string folder);
@@ -78,6 +85,8 @@ class AssetReader {
   std::vector<std::string> folders_;
   std::uint64_t bytes_read_ = 0;
   std::uint64_t picture_bytes_ = 0;
+  bool reads_as_mitsuba_ = false;
+  double returned_ = 0;
   std::multimap<std::string, KnownPicture> pictures_;                     // by path or name
   std::map<std::string, std::shared_ptr<const MeasuredTable>> measured_;  // by path
 };

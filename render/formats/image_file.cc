@@ -300,7 +300,8 @@ StatusOr<Picture> ReadByStb(std::string_view bytes, const PixelEncoding& encodin
   }
   const bool is_16_bit = stbi_is_16_bit_from_memory(data, size) != 0;
   Picture picture;
-  const bool may_be_opacity = use == PictureUse::kNumbers && file_channels == 4;
+  const bool may_be_opacity =
+      use == PictureUse::kNumbers && file_channels == 4 && !encoding.is_of_all_files;
   const std::optional<std::size_t> one_channel = OneChannelOf(use);
   picture.channels = one_channel.has_value()       ? 4
                      : use == PictureUse::kVectors ? 3
@@ -506,8 +507,8 @@ StatusOr<Picture> ReadPfm(std::string_view bytes, std::uint64_t max_size_bytes, 
   return picture;
 }
 
-StatusOr<Picture> PictureOfExr(std::string_view bytes, std::uint64_t max_size_bytes,
-                               PictureUse use) {
+StatusOr<Picture> PictureOfExr(std::string_view bytes, std::uint64_t max_size_bytes, PictureUse use,
+                               bool may_be_opacity) {
   LUCERNA_ASSIGN_OR_RETURN(Image image, DecodeExr(bytes));
   std::vector<const ImageChannel*> channels = {image.Find("R"), image.Find("G"), image.Find("B")};
   if (std::find(channels.begin(), channels.end(), nullptr) != channels.end()) {
@@ -515,7 +516,7 @@ StatusOr<Picture> PictureOfExr(std::string_view bytes, std::uint64_t max_size_by
     if (channels[0] == nullptr) return Bad("it has neither the channels R, G and B nor Y");
   }
   const ImageChannel* opacity = image.Find("A");
-  if (use == PictureUse::kNumbers && channels.size() == 3 && opacity != nullptr &&
+  if (may_be_opacity && channels.size() == 3 && opacity != nullptr &&
       std::ranges::any_of(opacity->pixels, [](float value) { return value != 1; })) {
     channels = {opacity};
   }
@@ -546,15 +547,19 @@ StatusOr<Picture> ReadOfEitherUse(std::string_view bytes, std::string_view path,
 double PixelEncoding::Decode(double coded) const {
   switch (kind) {
     case Kind::kSrgb:
-      return coded <= 0.04045 ? coded / 12.92 : std::pow((coded + 0.055) / 1.055, 2.4);
+      return BelowCoat(coded <= 0.04045 ? coded / 12.92 : std::pow((coded + 0.055) / 1.055, 2.4));
     case Kind::kLinear:
-      return coded;
+      return BelowCoat(coded);
     case Kind::kGamma:
-      return std::pow(coded, gamma);
+      return BelowCoat(std::pow(coded, gamma));
     case Kind::kStep:
       return coded >= threshold ? 1 : 0;
   }
   return coded;
+}
+
+double PixelEncoding::BelowCoat(double color) const {
+  return returned > 0 ? color / (1 - returned + color * returned) : color;
 }
 
 StatusOr<Picture> ReadPicture(std::string_view bytes, std::string_view path,
@@ -566,6 +571,14 @@ StatusOr<Picture> ReadPicture(std::string_view bytes, std::string_view path,
 }
 
 namespace {
+
+// Of a file of numbers, which are not decoded.
+StatusOr<Picture> BelowCoat(StatusOr<Picture> picture, const PixelEncoding& encoding) {
+  if (!picture.ok() || !(encoding.returned > 0)) return picture;
+  for (float& value : picture->linear)
+    value = static_cast<float>(encoding.BelowCoat(static_cast<double>(value)));
+  return picture;
+}
 
 StatusOr<Picture> ReadOfEitherUse(std::string_view bytes, std::string_view path,
                                   const PixelEncoding& encoding, std::uint64_t max_size_bytes,
@@ -581,17 +594,22 @@ StatusOr<Picture> ReadOfEitherUse(std::string_view bytes, std::string_view path,
   if (extension == "jpg" || extension == "jpeg") {
     LUCERNA_RETURN_IF_ERROR(CheckJpeg(bytes));
     LUCERNA_RETURN_IF_ERROR(CheckHuffmanTables(bytes));
-    const bool is_srgb = use == PictureUse::kColors || use == PictureUse::kNumbers;
+    const bool is_srgb =
+        (use == PictureUse::kColors || use == PictureUse::kNumbers) && !encoding.is_of_all_files;
     return ReadByStb(WithHuffmanTables(bytes), is_srgb ? PixelEncoding() : encoding, max_size_bytes,
                      use);
   }
   if (extension == "tga") {
     LUCERNA_RETURN_IF_ERROR(CheckTga(bytes));
-    return ReadByStb(bytes, {}, max_size_bytes, use);
+    return ReadByStb(bytes, encoding.is_of_all_files ? encoding : PixelEncoding(), max_size_bytes,
+                     use);
   }
-  if (extension == "hdr") return ReadHdr(bytes, max_size_bytes);
-  if (extension == "pfm") return ReadPfm(bytes, max_size_bytes, use);
-  if (extension == "exr") return PictureOfExr(bytes, max_size_bytes, use);
+  if (extension == "hdr") return BelowCoat(ReadHdr(bytes, max_size_bytes), encoding);
+  if (extension == "pfm") return BelowCoat(ReadPfm(bytes, max_size_bytes, use), encoding);
+  if (extension == "exr") {
+    const bool may_be_opacity = use == PictureUse::kNumbers && !encoding.is_of_all_files;
+    return BelowCoat(PictureOfExr(bytes, max_size_bytes, use, may_be_opacity), encoding);
+  }
   return absl::InvalidArgumentError(
       "images are read as .png, .jpg, .tga, .hdr, .pfm and .exr only");
 }

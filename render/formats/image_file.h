@@ -22,9 +22,16 @@ struct PixelEncoding {
   Kind kind = Kind::kSrgb;
   double gamma = 1;      // kGamma
   double threshold = 0;  // kStep
+  // As Mitsuba has it: of JPEG and TGA too, and opacity is no number. pbrt-v4 reads those as sRGB.
+  bool is_of_all_files = false;
+  // Colours v become v / (1 - returned + v · returned): of a base below a coat that sends this
+  // share of its light back to it, where the file says what it reflects as if it were white there.
+  double returned = 0;
 
   // [0, 1] -> [0, 1].
   [[nodiscard]] double Decode(double coded) const;
+  // Of a decoded colour, by `returned`.
+  [[nodiscard]] double BelowCoat(double color) const;
   bool operator==(const PixelEncoding&) const = default;
 };
 
@@ -35,8 +42,8 @@ struct PixelEncoding {
 enum class PictureUse : std::uint8_t { kColors, kNumbers, kVectors, kRed, kGreen, kBlue, kOpacity };
 
 // Reads PNG, JPEG, TGA, Radiance HDR, PFM or EXR, by the end of `path`. `encoding` is that of PNG,
-// and of JPEG for the uses of glTF 2.0; else JPEG and TGA are sRGB. The others are linear. Of
-// colours negative numbers become 0, and opacity is dropped.
+// of JPEG for the uses of glTF 2.0, and of all whole numbers where it says so; else JPEG and TGA
+// are sRGB. The others are linear. Of colours negative numbers become 0, and opacity is dropped.
 // Errors: INVALID_ARGUMENT with what is wrong; RESOURCE_EXHAUSTED for more than
 // kMaxPicturePixels, or more than `max_size_bytes` of pixels in memory.
 [[nodiscard]] StatusOr<Picture> ReadPicture(std::string_view bytes, std::string_view path,

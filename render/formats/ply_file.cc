@@ -341,17 +341,23 @@ float LinearOf(float byte) {
 
 Status ReadVertices(Body& body, Format format, const Element& element, TriangleMesh& mesh,
                     std::vector<float>* spacings = nullptr) {
-  constexpr std::array<std::string_view, 17> kColumns = {"x", "y", "z",   "nx",    "ny",      "nz",
-                                                         "u", "v", "s",   "t",     "spacing", "r",
-                                                         "g", "b", "red", "green", "blue"};
+  constexpr std::array<std::string_view, 21> kColumns = {
+      "x",   "y",     "z",    "nx",        "ny",        "nz",        "u",
+      "v",   "s",     "t",    "spacing",   "r",         "g",         "b",
+      "red", "green", "blue", "texture_u", "texture_v", "texture_s", "texture_t"};
   Rows rows(body, format, element, kColumns);
   if (!rows.Has({0, 1, 2})) return Bad("its vertices have no x, y and z");
   const bool has_normals = rows.Has({3, 4, 5});
-  const bool has_uv = rows.Has({6, 7});
-  const bool has_st = rows.Has({8, 9});
+  // The column of the first of the two, under any of their names.
+  const auto uv_column = [&]() -> std::optional<std::size_t> {
+    for (const std::size_t column : {6U, 8U, 17U, 19U}) {
+      if (rows.Has({column, column + 1})) return column;
+    }
+    return std::nullopt;
+  }();
   const bool has_spacings = spacings != nullptr && rows.Has({10});
   mesh.positions.resize(element.count);
-  if (has_uv || has_st) mesh.uvs.resize(element.count);
+  if (uv_column.has_value()) mesh.uvs.resize(element.count);
   if (has_normals) mesh.normals.resize(element.count);
   // Numbers, as Mitsuba writes them, or bytes, which are coded as those of images are.
   const bool has_rgb = rows.Has({11, 12, 13});
@@ -369,8 +375,8 @@ Status ReadVertices(Body& body, Format format, const Element& element, TriangleM
       const Vec3 normal = rows.VectorAt(3);
       mesh.normals[vertex] = IsFinite(normal) ? normal : Vec3();
     }
-    if (has_uv || has_st) {
-      const Vec2 uv = has_uv ? Vec2{rows[6], rows[7]} : Vec2{rows[8], rows[9]};
+    if (uv_column.has_value()) {
+      const Vec2 uv = {rows[*uv_column], rows[*uv_column + 1]};
       mesh.uvs[vertex] = std::isfinite(uv.x) && std::isfinite(uv.y) ? uv : Vec2();
     }
     if (has_rgb) {

@@ -17,10 +17,20 @@ using Kind = Material::Kind;
 // Of one table, measured on scenes of 8 to 600 different coats. Walks through a layer that scatters
 // take longer the thicker it is, up to a bound; tables of stretched facets have rows.
 double SecondsOfCoat(const Material& material) {
-  const double rows =
-      material.alpha_u != material.alpha_v || material.base_alpha_u != material.base_alpha_v ? 3
-                                                                                             : 1;
-  const double facets = (material.kind == Kind::kCoatedConductor ? 0.12 : 0.006) * rows;
+  const bool has_metal = material.kind == Kind::kCoatedConductor;
+  const bool is_stretched =
+      material.alpha_u != material.alpha_v || material.base_alpha_u != material.base_alpha_v;
+  double facets = 0.006 * (is_stretched ? 9 : 1);
+  if (has_metal) {
+    // Of light on its way up less the more leaves the denser the coat is: so often it meets the
+    // metal, and each time of all walks takes so long.
+    constexpr double kSecondsOfMeeting = 0.006;
+    const double meetings = std::min<double>(
+        material.base_hits, 2.5 * static_cast<double>(material.ior * material.ior));
+    facets = (0.12 + kSecondsOfMeeting * std::max(0.0, meetings - 5)) * (is_stretched ? 3 : 1);
+  } else if (material.alpha_u == 0 && material.alpha_v == 0 && !material.HasCoatTexture()) {
+    facets = 5e-4;  // one sum
+  }
   if (!material.HasHaze()) return facets;
   return facets + std::min(1.0, 0.1 + 0.4 * static_cast<double>(material.thickness));
 }
@@ -88,13 +98,18 @@ bool HasCoatTables(const Material& material) {
 }
 
 double SecondsOfTables(const std::vector<Material>& materials) {
-  std::set<std::pair<CoatNumbers, bool>> coats;
+  // With a bit for each texture by which the tables of a family differ.
+  std::set<std::pair<CoatNumbers, int>> coats;
   std::set<std::pair<float, float>> below;
   double seconds = 0;
   for (const Material& material : materials) {
     if (!HasCoatTables(material)) continue;
     const bool has_family = material.HasCoatTexture();
-    if (coats.emplace(CoatNumbersOf(material), has_family).second)
+    const int textures =
+        (material.thickness_texture != kNoTexture ? 1 : 0) +
+        ((material.roughness_textures[0] & material.roughness_textures[1]) != kNoTexture ? 2 : 0) +
+        (has_family ? 4 : 0);
+    if (coats.emplace(CoatNumbersOf(material), textures).second)
       seconds += SecondsOfCoat(material) * (has_family ? CoatFamily::kTables : 1);
     if (material.kind == Kind::kSubsurface && below.emplace(material.ior, material.phase_g).second)
       seconds += kSecondsBelowSurface;

@@ -1200,6 +1200,7 @@ TEST(GltfReaderTest, AClearcoatLiesOverMetalAndOverWhatIsNone) {
   EXPECT_FLOAT_EQ(paint.base_alpha_u, 0.36F);
   EXPECT_FLOAT_EQ(paint.alpha_u, 0.04F);
   EXPECT_FLOAT_EQ(paint.k.g, 2);  // of a reflectance of one half
+  EXPECT_GE(paint.base_hits, 100) << "no light is lost between coat and metal";
   const Material lacquer = MaterialOf(read(0, whole));
   EXPECT_EQ(lacquer.kind, Material::Kind::kCoatedDiffuse);
   EXPECT_TRUE(lacquer.coat_passes_rest);

@@ -137,14 +137,19 @@ TEST(LightUnitsTest, IlluminanceIsWhatArrives) {
       {"LightSource \"distant\" \"float illuminance\" 5 \"blackbody L\" 3000 " + down, 5},
       {"LightSource \"infinite\" \"float illuminance\" 5", 5},
       {"LightSource \"infinite\" \"float illuminance\" 5 \"rgb L\" [ 2 2 2 ]", 10},
-      {"LightSource \"infinite\" \"float illuminance\" 5 \"string filename\" \"square.pfm\"", 5},
+      // pbrt-v4 takes half the illuminance of a map, and so makes it twice as bright.
+      {"LightSource \"infinite\" \"float illuminance\" 5 \"string filename\" \"square.pfm\"", 10},
       {"LightSource \"infinite\" \"float illuminance\" 5 \"float scale\" 2 \"string filename\" "
        "\"square.pfm\"",
-       10},
+       20},
       // Through a portal that takes up nearly all of the sky.
       {"LightSource \"infinite\" \"float illuminance\" 5 \"string filename\" \"square.pfm\" "
        "\"point3 portal\" [ -1e4 -1e4 1  -1e4 1e4 1  1e4 1e4 1  1e4 -1e4 1 ]",
-       5},
+       10},
+      // To pbrt-v4 a map of one pixel, whose middle looks up.
+      {"LightSource \"infinite\" \"float illuminance\" 5 \"rgb L\" [ 2 2 2 ] "
+       "\"point3 portal\" [ -1e4 -1e4 1  -1e4 1e4 1  1e4 1e4 1  1e4 -1e4 1 ]",
+       2.5},
   };
   for (const Case& c : cases) {
     // Of the samples' cosines the mean has a standard error of about a part in a thousand; a map's

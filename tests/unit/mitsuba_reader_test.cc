@@ -14,7 +14,11 @@
 #include "render/formats/mitsuba/meshes.h"
 #include "render/formats/read_scene.h"
 #include "render/math/equal_area_square.h"
+#include "render/math/rng.h"
+#include "render/math/warp.h"
 #include "render/scene/texture.h"
+#include "render/transport/bsdf.h"
+#include "render/transport/microfacet.h"
 #include "tests/support/measured_file.h"
 #include "tests/support/memory_files.h"
 
@@ -296,6 +300,62 @@ TEST(MitsubaReaderTest, APlasticReflectsAsMuchOfTheLightBelowItsCoatAsMitsubaSay
   }
 }
 
+// The rougher a coat is, the less it reflects back: what is left of the light is that of random
+// facets that are drawn as they are seen.
+TEST(MitsubaReaderTest, ARoughPlasticReflectsAsMuchBelowItsCoatAsItsFacetsDo) {
+  const double index = 1.49 / 1.000277;
+  constexpr float kAlpha = 0.3F;
+  constexpr double kRho = 0.5;
+  KeyedRng rng(5);
+  constexpr int kSamples = 200'000;
+  const Ggx facets(kAlpha, kAlpha);
+  double inside = 0;
+  for (int i = 0; i < kSamples; ++i) {
+    const float u1 = rng.Uniform();
+    const Vec3 w = SquareToCosineHemisphere(u1, rng.Uniform());
+    const float u2 = rng.Uniform();
+    const Vec3 m = facets.SampleVisible(w, u2, rng.Uniform());
+    const Vec3 out = ReflectAt(w, m);
+    float cos_t = 0;
+    if (Dot(w, m) > 0 && out.z > 0) {
+      inside += static_cast<double>(
+          FresnelDielectric(Dot(w, m), static_cast<float>(1 / index), cos_t) * facets.G1(out));
+    }
+  }
+  inside /= kSamples;
+  const MaterialNumbers material = MaterialOf(
+      "<bsdf type='roughplastic'><string name='distribution' value='ggx'/>"
+      "<float name='alpha' value='0.3'/><rgb name='diffuse_reflectance' value='0.5'/></bsdf>");
+  // 0.5 % of four standard errors of the mean, and as much of the sum.
+  EXPECT_NEAR(static_cast<double>(material.reflectance.g), kRho / (1 - inside + kRho * inside),
+              0.01);
+}
+
+// In Mitsuba an encoding is that of all files, and opacity is no number.
+TEST(MitsubaReaderTest, PicturesOfNumbersAreWhatTheirColoursSay) {
+  // One pixel of a TGA: blue, green, red, opacity.
+  const std::string tga = std::string({0, 0, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 1, 0, 32, 8}) +
+                          std::string(3, '\x80') + std::string(1, '\x20');
+  const Scene scene = SceneOf(
+      "<shape type='rectangle'><bsdf type='mask'><texture type='bitmap' name='opacity'><boolean "
+      "name='raw' value='true'/><string name='filename' value='a.tga'/><string name='filter_type' "
+      "value='nearest'/></texture><bsdf type='diffuse'/></bsdf></shape>",
+      {{"a.tga", tga}});
+  const Texture& opacity = scene.textures.at(0);
+  EXPECT_NEAR(opacity.picture->At(0, 0).g, 128.0F / 255, 1e-6F);
+  EXPECT_TRUE(opacity.is_nearest);
+}
+
+TEST(MitsubaReaderTest, AMirrorDoesNotTurnRoundShapesOver) {
+  const std::string mirror = "<transform name='to_world'><scale x='-1' y='1' z='1'/></transform>";
+  for (const std::string emitter : {"", "<emitter type='area'/>"}) {
+    const Scene scene = SceneOf("<shape type='sphere'>" + mirror + emitter +
+                                "</shape><shape type='disk'>" + mirror + emitter + "</shape>");
+    EXPECT_FALSE(scene.spheres.at(0).inward);
+    EXPECT_GT(scene.disks.at(0).normal.z, 0);
+  }
+}
+
 TEST(MitsubaReaderTest, BlendsMasksAndBumpsAreMixesAlphaAndDisplacement) {
   const Scene scene = SceneOf(
       "<bsdf type='diffuse' id='a'><rgb name='reflectance' value='.1'/></bsdf>"
@@ -355,8 +415,33 @@ const std::string kFourPixels = [] {
   return pfm;
 }();
 
+// One pixel of 0.5.
+const std::string kGreyPixels = [] {
+  std::string pfm = "PF\n1 1\n-1\n";
+  const std::array<float, 3> pixel = {0.5F, 0.5F, 0.5F};
+  pfm.append(reinterpret_cast<const char*>(pixel.data()), sizeof(pixel));
+  return pfm;
+}();
+
 std::string Textured(std::string_view texture) {
   return "<shape type='rectangle'><bsdf type='diffuse'>" + std::string(texture) + "</bsdf></shape>";
+}
+
+// Of a bitmap each pixel is what the colour would be.
+TEST(MitsubaReaderTest, APictureBelowACoatIsAsItsColoursWouldBe) {
+  const auto scene_of = [](const std::string& more) {
+    return SceneOf("<shape type='rectangle'><bsdf type='plastic'>" + more +
+                       "<texture type='bitmap' name='diffuse_reflectance'><string name='filename' "
+                       "value='grey.pfm'/></texture></bsdf></shape>",
+                   {{"grey.pfm", kGreyPixels}});
+  };
+  const MaterialNumbers alone =
+      MaterialOf("<bsdf type='plastic'><rgb name='diffuse_reflectance' value='0.5'/></bsdf>");
+  const Scene linear = scene_of("");
+  ExpectNear(ColorAt(linear, 0.5F, 0.5F), alone.reflectance);
+  EXPECT_GT(alone.reflectance.g, 0.6F);
+  const Scene nonlinear = scene_of("<boolean name='nonlinear' value='true'/>");
+  ExpectNear(ColorAt(nonlinear, 0.5F, 0.5F), {0.5F, 0.5F, 0.5F});
 }
 
 TEST(MitsubaReaderTest, PicturesHaveTheirTopWhereVIsZero) {
@@ -732,6 +817,29 @@ TEST(MitsubaReaderTest, ClippingAndShiftsThatChangeAViewAreWarnedOf) {
     EXPECT_THAT(Said(WithSensor(Float(name, 3))),
                 HasSubstr("\"" + name + "\" of <sensor type=\"perspective\"> is ignored"));
   }
+}
+
+TEST(MitsubaReaderTest, AThinLensWithoutADistanceFocusesFarAway) {
+  const auto scene_of = [](const std::string& more) {
+    return ReadXml(
+        "<scene version='3.0.0'><sensor type='thinlens'><float name='aperture_radius' "
+        "value='0.1'/><float name='fov' value='40'/>" +
+        more + "</sensor><emitter type='constant'/><shape type='sphere'/></scene>");
+  };
+  EXPECT_EQ(scene_of("").scene.camera.focal_distance, 1e4F);
+  EXPECT_EQ(scene_of("<float name='focus_distance' value='3'/>").scene.camera.focal_distance, 3);
+}
+
+TEST(MitsubaReaderTest, AxesOfAnglesAreKnownInAnyCaseOrRefused) {
+  const auto scene_of = [](const std::string& axis) {
+    return ReadXml(
+        "<scene version='3.0.0'><sensor type='perspective'><float name='fov' "
+        "value='40'/><string name='fov_axis' value='" +
+        axis + "'/></sensor><emitter type='constant'/><shape type='sphere'/></scene>");
+  };
+  EXPECT_EQ(scene_of("Y").scene.camera.fov_deg, scene_of("y").scene.camera.fov_deg);
+  EXPECT_NE(scene_of("y").scene.camera.fov_deg, scene_of("x").scene.camera.fov_deg);
+  EXPECT_THAT(Said(scene_of("z")), HasSubstr("must be x, y, diagonal, smaller or larger"));
 }
 
 TEST(MitsubaReaderTest, AFocalLengthMayHaveAFraction) {

@@ -6,6 +6,7 @@
 
 #include "render/formats/read_scene.h"
 #include "render/math/color_space.h"
+#include "render/scene/texture.h"
 #include "tests/support/pbrt_text.h"
 
 namespace lucerna {
@@ -55,6 +56,19 @@ TEST(PbrtColorSpaceTest, ReflectancesAreNeverAboveOne) {
   const Rgb color = parsed.scene.materials.back().reflectance;
   EXPECT_EQ(color.r, 1);
   EXPECT_EQ(color.g, 0);
+}
+
+TEST(PbrtColorSpaceTest, IsThatOfTexturesToo) {
+  const ParsedScene parsed = ParseWorld(
+      "LightSource \"infinite\" ColorSpace \"rec2020\" Texture \"t\" \"spectrum\" \"checkerboard\" "
+      "\"rgb tex1\" [0.5 0.4 0.25] \"rgb tex2\" [0.5 0.4 0.25] "
+      "Material \"diffuse\" \"texture reflectance\" \"t\" Shape \"sphere\"");
+  ASSERT_TRUE(parsed.ok()) << parsed.ToStatus();
+  const Rgb color = TextureColor(parsed.scene.textures,
+                                 static_cast<std::int32_t>(parsed.scene.textures.size()) - 1, {});
+  ExpectNear(color, 0.5 * 1.6605 - 0.4 * 0.5876 - 0.25 * 0.0728,
+             -0.5 * 0.1246 + 0.4 * 1.1329 - 0.25 * 0.0083,
+             -0.5 * 0.0182 - 0.4 * 0.1006 + 0.25 * 1.1187, 2e-4);
 }
 
 TEST(PbrtColorSpaceTest, BelongsToTheGraphicsState) {

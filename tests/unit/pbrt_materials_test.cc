@@ -359,6 +359,26 @@ TEST(PbrtMaterialsTest, AnEmitterWithAlphaBelowZeroEmitsNothing) {
   }
 }
 
+// What pbrt-v4 holds within a range is held, and said.
+TEST(PbrtMaterialsTest, RoughnessOfHairIsHeldAtOne) {
+  const std::string hair =
+      "Material \"hair\" \"float beta_m\" 1.5 Shape \"curve\" \"point3 P\" [0 0 0 1 0 0 2 0 0 3 0 "
+      "0]";
+  EXPECT_EQ(ReadWorld(hair).materials.back().beta_m, 1);
+  EXPECT_THAT(SaidOfWorld(hair), HasSubstr("\"hair\" is 1.5 and is held at 1"));
+}
+
+// Files of curves have any name, and a default of Attribute may be one.
+TEST(PbrtMaterialsTest, CurvesOfFilesHaveAnyNameAndMayBeDefaults) {
+  const std::map<std::string, std::string> files = {{"half.txt", "400 0.5 700 0.5\n"}};
+  for (const std::string world :
+       {"Material \"diffuse\" \"spectrum reflectance\" \"half.txt\" Shape \"sphere\"",
+        "Attribute \"material\" \"spectrum reflectance\" \"half.txt\" "
+        "Material \"diffuse\" Shape \"sphere\""}) {
+    EXPECT_NEAR(ReadWorld(world, files).materials.back().reflectance.g, 0.5F, 1e-3F) << world;
+  }
+}
+
 // What no shape has takes no part: a saturated metal does not make a job carry wavelengths, and no
 // tables are made of coats. Parts of mixes on shapes stay.
 TEST(PbrtMaterialsTest, MaterialsThatNoShapeHasAreDropped) {
@@ -393,6 +413,18 @@ TEST(PbrtMaterialsTest, TooManyDifferentCoatsAreAnError) {
     return text;
   };
   EXPECT_THAT(SaidOfWorld(world(600, true)), HasSubstr("error: the tables of so many different"));
+  // Of coats that let little out again, light meets the metal a thousand times.
+  std::string dense;
+  for (int i = 0; i < 12; ++i) {
+    dense +=
+        "Material \"coatedconductor\" \"float interface.roughness\" 0 \"float "
+        "conductor.roughness\" " +
+        std::to_string(0.01 + 0.001 * i) +
+        " \"float interface.eta\" 100 \"float thickness\" 0 \"integer maxdepth\" 1000000 Shape "
+        "\"sphere\"\n";
+  }
+  EXPECT_THAT(SaidOfWorld(dense), HasSubstr("error: the tables of so many different"));
+  EXPECT_THAT(SaidOfWorld(world(400, true)), Not(HasSubstr("error")));
   EXPECT_THAT(SaidOfWorld(world(400, true)), Not(HasSubstr("error")));
   EXPECT_THAT(SaidOfWorld(world(600, false)), Not(HasSubstr("error")));
 }

@@ -557,11 +557,11 @@ TEST(PbrtParserTest, BehindAPortalColoursByTemperatureAndWavelengthKeepTheirUnit
   EXPECT_NEAR(luminance("\"spectrum L\" [300 2 900 2]" + portal), 6, 1e-4);
   EXPECT_NEAR(luminance("\"spectrum L\" [300 2 900 2]"), 1, 1e-4);
   EXPECT_NEAR(luminance("\"rgb L\" [2 2 2]" + portal), 6, 1e-4);
-  // A picture's illuminance is that of its pixels, whatever their unit.
+  // A picture's illuminance is that of its pixels, whatever their unit: of one, 2 pi of it.
   const std::string lux = portal + " \"float illuminance\" 2";
   for (const std::string light :
        {"\"spectrum L\" [300 2 900 2]", "\"rgb L\" [2 2 2]", "\"blackbody L\" 6500"})
-    EXPECT_NEAR(luminance(light + lux), 3 * 2 / std::numbers::pi, 1e-4) << light;
+    EXPECT_NEAR(luminance(light + lux), 3 * 2 / (2 * std::numbers::pi), 1e-4) << light;
   for (const double temperature_k : {2500.0, 6500.0}) {
     // h c / (k T) in nm.
     const double unit_nm = 6.62607015e-34 * 299792458 / (1.380649e-23 * temperature_k) * 1e9;
@@ -725,6 +725,28 @@ TEST(PbrtParserTest, SomeMistakesAreWarnings) {
   EXPECT_THAT(SaidOfWorld("ObjectEnd"), HasSubstr("error: ObjectEnd without ObjectBegin"));
 }
 
+// pbrt-v4 reads TransformBegin as AttributeBegin.
+TEST(PbrtParserTest, AScopeMayEndByTheOtherName) {
+  const Scene scene = ReadWorld(
+      "TransformBegin Translate 1 0 0 AttributeBegin Translate 1 0 0 TransformEnd "
+      "Shape \"sphere\" AttributeEnd Shape \"sphere\" LightSource \"infinite\"");
+  ExpectNear(scene.spheres.at(0).center, {1, 0, 0});
+  ExpectNear(scene.spheres.at(1).center, {0, 0, 0});
+}
+
+TEST(PbrtParserTest, EndsOfACropMayBeSwapped) {
+  const std::string film =
+      "Film \"rgb\" \"integer xresolution\" 100 \"integer yresolution\" 100 \"float cropwindow\" ";
+  const std::string world = " WorldBegin LightSource \"infinite\" Shape \"sphere\"";
+  const Scene scene = ReadPbrt(film + "[0.75 0.25 1 0]" + world);
+  EXPECT_EQ(scene.film.crop_x0, 25);
+  EXPECT_EQ(scene.film.crop_x1, 75);
+  EXPECT_EQ(scene.film.crop_y0, 0);
+  EXPECT_EQ(scene.film.crop_y1, 100);
+  EXPECT_THAT(SaidOf(ParsePbrt(film + "[0 1 0 1] \"integer pixelbounds\" [0 1 0 1]" + world)),
+              HasSubstr("warning: \"pixelbounds\" of Film \"rgb\" is ignored, as by pbrt-v4"));
+}
+
 TEST(PbrtParserTest, WithoutACameraThereIsThatOfPbrt) {
   const ParsedScene parsed = ParsePbrt("WorldBegin LightSource \"infinite\" Shape \"sphere\"");
   ASSERT_TRUE(parsed.ok()) << parsed.ToStatus();
@@ -759,7 +781,9 @@ TEST(PbrtParserTest, DepthsOfPbrtThatHaveNoPlaceHere) {
   const ParsedScene endless = parse("-1");
   EXPECT_EQ(endless.scene.integrator.max_depth, 1000);
   EXPECT_THAT(SaidOf(endless), HasSubstr("warning: \"maxdepth\""));
-  EXPECT_FALSE(parse("10001").ok());
+  const ParsedScene long_paths = parse("10001");
+  EXPECT_EQ(long_paths.scene.integrator.max_depth, 10000);
+  EXPECT_THAT(SaidOf(long_paths), HasSubstr("is 10001 and is held at 10000"));
 }
 
 // Names that are put together while a material is read, with a prefix or without.
@@ -937,10 +961,10 @@ TEST(PbrtParserTest, EnvironmentMapsAreSquareAndPlaced) {
   ASSERT_TRUE(projective.ok());
   ExpectNear(projective.scene.infinite_lights[0].axes.x, {0, 1, 0});
   ExpectNear(projective.scene.infinite_lights[0].axes.y, {-1, 0, 0});
-  // As bright as a constant light of that illuminance: 3 times the scale is 1 / pi.
+  // Twice as bright as a constant light of that illuminance: 3 times the scale is 2 / pi.
   const Scene lux = ReadWorld(
       "LightSource \"infinite\" \"string filename\" \"sky.pfm\" \"float illuminance\" 1", files);
-  EXPECT_NEAR(lux.infinite_lights[0].radiance.g * 3 * kPi, 1, 1e-2);
+  EXPECT_NEAR(lux.infinite_lights[0].radiance.g * 3 * kPi, 2, 2e-2);
 
   const auto said = [&](const std::string& world) {
     return SaidOfPbrt("Camera \"perspective\" WorldBegin\n" + world, files);

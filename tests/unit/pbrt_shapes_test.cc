@@ -81,7 +81,7 @@ TEST(PbrtShapesTest, APartOfASphere) {
 }
 
 TEST(PbrtShapesTest, AnEllipsoidIsClosedAndHasItsVolume) {
-  const Scene scene = ReadShapes("Translate 1 2 3 Scale 1 2 -3 Shape \"sphere\"");
+  const Scene scene = ReadShapes("Translate 1 2 3 Scale 1 2 3 Shape \"sphere\"");
   const TriangleMesh& mesh = scene.meshes.at(0);
   ExpectOutward(mesh, {1, 2, 3});
   double volume = 0;
@@ -102,6 +102,31 @@ TEST(PbrtShapesTest, AnEllipsoidIsClosedAndHasItsVolume) {
     ASSERT_EQ(count, 1);
     ASSERT_TRUE(sides.contains({side.second, side.first}));
   }
+}
+
+// Round shapes face the other way under a mirroring transform, as in pbrt-v4, unless they emit.
+TEST(PbrtShapesTest, AMirrorTurnsRoundShapesOver) {
+  const std::string mirror = "Scale -1 1 1 ";
+  const std::string light = "AreaLightSource \"diffuse\" ";
+  EXPECT_FALSE(ReadShapes("Shape \"sphere\"").spheres.at(0).inward);
+  EXPECT_TRUE(ReadShapes(mirror + "Shape \"sphere\"").spheres.at(0).inward);
+  EXPECT_FALSE(ReadShapes(mirror + "ReverseOrientation Shape \"sphere\"").spheres.at(0).inward);
+  EXPECT_FALSE(ReadShapes(mirror + light + "Shape \"sphere\"").spheres.at(0).inward);
+  EXPECT_LT(ReadShapes(mirror + "Shape \"disk\"").disks.at(0).normal.z, 0);
+  EXPECT_GT(ReadShapes(mirror + light + "Shape \"disk\"").disks.at(0).normal.z, 0);
+  ExpectOutward(ReadShapes("Scale 1 2 1 Shape \"sphere\"").meshes.at(0), {});
+  ExpectOutward(ReadShapes("Scale -1 2 1 Shape \"sphere\"").meshes.at(0), {}, -1);
+  ExpectOutward(ReadShapes(mirror + "Shape \"cylinder\"").meshes.at(0), {}, -1);
+}
+
+TEST(PbrtShapesTest, APhimaxOfMoreThanATurnIsOne) {
+  EXPECT_EQ(ReadShapes("Shape \"sphere\" \"float phimax\" 361").spheres.size(), 1U);
+}
+
+TEST(PbrtShapesTest, TangentsOfVerticesAreWarnedOf) {
+  EXPECT_THAT(SaidOfShapes("Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0] \"vector3 S\" "
+                           "[1 0 0 1 0 0 1 0 0]"),
+              HasSubstr("warning: \"S\" of Shape \"trianglemesh\" is ignored"));
 }
 
 TEST(PbrtShapesTest, PartsOfDisksAndCylinders) {

@@ -102,7 +102,7 @@ TEST(PlyFileTest, SkipsFacesThatAreNoTrianglesOrQuadrangles) {
   EXPECT_EQ(faces.skipped, 3U);
 }
 
-TEST(PlyFileTest, ReadsTextureCoordinatesByEitherName) {
+TEST(PlyFileTest, ReadsTextureCoordinatesByAllTheirNames) {
   const auto uvs = [](const std::string& names) {
     return ParsePly("ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\n" + names +
                     "property float y\nproperty float z\nelement face 1\n"
@@ -114,6 +114,8 @@ TEST(PlyFileTest, ReadsTextureCoordinatesByEitherName) {
   const auto expected = ElementsAre(Vec2{0.5F, 0.25F}, Vec2{0, 0}, Vec2{3, 4});
   EXPECT_THAT(uvs("property float u\nproperty float v\n"), expected);
   EXPECT_THAT(uvs("property float s\nproperty float t\n"), expected);
+  EXPECT_THAT(uvs("property float texture_u\nproperty float texture_v\n"), expected);
+  EXPECT_THAT(uvs("property float texture_s\nproperty float texture_t\n"), expected);
   // One alone is none.
   EXPECT_TRUE(uvs("property float s\nproperty float v\n").empty());
 }

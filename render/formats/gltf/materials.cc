@@ -227,6 +227,7 @@ std::int32_t MaterialReader::AddMetalBelow(const Amount& coat) {
   metal.kind = Material::Kind::kCoatedConductor;
   metal.is_metal_in_coat = true;
   metal.ior = static_cast<float>(kDefaultIor);
+  metal.base_hits = 100;  // until nothing is left
   SetRoughness(coat, metal);
   SetBaseRoughness(alpha_, metal);
   return Add(std::move(metal));

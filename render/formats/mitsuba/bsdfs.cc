@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <utility>
 
 #include "absl/strings/ascii.h"
@@ -165,25 +166,88 @@ bool MitsubaTranslator::AddConductor(const MitsubaObject& bsdf, ParameterList& l
   return true;
 }
 
+namespace {
+
+// Of unpolarised light that meets a surface from within a body of this index.
+double FresnelFromInside(double cosine, double index) {
+  const double sin2 = index * index * (1 - cosine * cosine);
+  if (sin2 >= 1) return 1;
+  const double beyond = std::sqrt(1 - sin2);
+  const double parallel = (cosine - index * beyond) / (cosine + index * beyond);
+  const double across = (index * cosine - beyond) / (index * cosine + beyond);
+  return (parallel * parallel + across * across) / 2;
+}
+
+// The share of diffuse light that a surface of GGX facets of width alpha sends back into a body of
+// this index: over facets m with the density D(m) cos(m), of light from all sides with the density
+// cosine / pi (Walter et al. 2007, "Microfacet Models for Refraction through Rough Surfaces").
+double InnerReflectance(double index, double alpha) {
+  constexpr int kSlopes = 32;
+  constexpr int kAzimuths = 32;
+  constexpr int kCosines = 128;
+  const double a2 = std::max(alpha * alpha, 1e-12);
+  const auto visible = [&](double cosine) {
+    const double c2 = cosine * cosine;
+    return 2 / (1 + std::sqrt(1 + a2 * (1 - c2) / c2));
+  };
+  double sum = 0;
+  for (int i = 0; i < kCosines; ++i) {
+    const double cos_w = std::sqrt((i + 0.5) / kCosines);
+    const double sin_w = std::sqrt(1 - cos_w * cos_w);
+    for (int j = 0; j < kSlopes; ++j) {
+      const double u = (j + 0.5) / kSlopes;
+      const double cos_m = 1 / std::sqrt(1 + a2 * u / (1 - u));
+      const double sin_m = std::sqrt(1 - cos_m * cos_m);
+      for (int k = 0; k < kAzimuths; ++k) {
+        const double azimuth = 2 * std::numbers::pi * (k + 0.5) / kAzimuths;
+        const double to_facet = sin_w * sin_m * std::cos(azimuth) + cos_w * cos_m;
+        const double cos_out = 2 * to_facet * cos_m - cos_w;
+        if (to_facet <= 0 || cos_out <= 0) continue;
+        sum += FresnelFromInside(to_facet, index) * visible(cos_w) * visible(cos_out) * to_facet /
+               (cos_w * cos_m);
+      }
+    }
+  }
+  return std::min(sum / (kCosines * kSlopes * kAzimuths), 1.0);
+}
+
+// The width that AddRoughness has added, or 0: of a texture its middle is not known here.
+double AlphaOf(const MadeDirective& made) {
+  double squares = 0;
+  int count = 0;
+  for (const Parameter& parameter : made.parameters) {
+    if (parameter.name == "remaproughness" || !parameter.name.ends_with("roughness")) continue;
+    if (parameter.numbers.size() != 1) continue;
+    squares += parameter.numbers[0] * parameter.numbers[0];
+    ++count;
+  }
+  return count > 0 ? std::sqrt(squares / count) : 0;
+}
+
+}  // namespace
+
 bool MitsubaTranslator::AddPlastic(const MitsubaObject& bsdf, ParameterList& list,
                                    MadeDirective& made) {
   const double index = FindIndex(list, "int_ior", kPlastic) / FindIndex(list, "ext_ior", kAir);
-  auto reflectance = Find(bsdf, list, "diffuse_reflectance", "reflectance", Meaning::kColor);
-  if (!reflectance.has_value()) reflectance = MakeColor("reflectance", Gray(0.5F), bsdf.location);
   const bool is_nonlinear = list.Bool("nonlinear", false);
+  // What the base reflects is multiplied by 1 / (1 - F), as if it were white under its coat, F
+  // being the share of diffuse light that the surface reflects back to it. With the reflectance
+  // below the same follows from reflections back and forth, which are what is rendered.
+  const double inside = is_nonlinear ? 0 : InnerReflectance(index, AlphaOf(made));
+  const MitsubaObject* texture = ChildOf(bsdf, "texture", "diffuse_reflectance");
+  if (texture != nullptr && texture->type == "bitmap") returned_ = inside;
+  assets_.ReadPicturesAsMitsuba(returned_);
+  auto reflectance = Find(bsdf, list, "diffuse_reflectance", "reflectance", Meaning::kColor);
+  assets_.ReadPicturesAsMitsuba();
+  const bool is_picture = std::exchange(returned_, 0) > 0;
+  if (!reflectance.has_value()) reflectance = MakeColor("reflectance", Gray(0.5F), bsdf.location);
   if (!is_nonlinear && reflectance->type == "rgb") {
-    // What the base reflects is multiplied by 1 / (1 - F), as if it were white under its coat, F
-    // being the share of diffuse light that the surface reflects back to it. With the reflectance
-    // below the same follows from reflections back and forth, which are what is rendered.
-    // F by Egan, Hilgeman & Reichman 1973, "Determination of Absorption and Scattering
-    // Coefficients for Nonhomogeneous Media. 2: Experiment".
-    const double inside = (-1.4399 / index + 0.7099) / index + 0.6681 + 0.0636 * index;
     for (double& rho : reflectance->numbers)
       rho = rho / (1 - inside + rho * inside);
-  } else if (!is_nonlinear) {
+  } else if (!is_nonlinear && !is_picture) {
     list.Warning("diffuse_reflectance",
-                 "is a texture, which is rendered as with nonlinear: its colours are darker and "
-                 "more saturated");
+                 "is neither a colour nor a bitmap and is rendered as with nonlinear: its colours "
+                 "are darker and more saturated");
   }
   made.parameters.push_back(*std::move(reflectance));
   made.parameters.push_back(MakeNumber("eta", index, bsdf.location));

@@ -1,5 +1,7 @@
 // Sensors, films, filters and integrators: what the view is and how it is rendered.
 #include <algorithm>
+#include <array>
+#include <cctype>
 #include <cmath>
 #include <iterator>
 #include <numbers>
@@ -155,7 +157,12 @@ void MitsubaTranslator::TranslateFilm(const MitsubaObject& sensor) {
       camera.parameters.push_back(std::move(window));
     }
   } else if (sensor.type == "perspective" || sensor.type == "thinlens") {
-    const std::string axis = view.String("fov_axis", "x");
+    std::string axis = view.String("fov_axis", "x");
+    for (char& c : axis)
+      c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    constexpr std::array<std::string_view, 5> kAxes = {"x", "y", "diagonal", "smaller", "larger"};
+    if (std::ranges::find(kAxes, axis) == kAxes.end())
+      view.Error("fov_axis", "must be x, y, diagonal, smaller or larger");
     double fov_deg = view.Float("fov", 0, {0, 179.999});
     if (const auto length = view.FindString("focal_length"); length.has_value()) {
       const auto of_length = FovOfFocalLength(*length);
@@ -172,7 +179,8 @@ void MitsubaTranslator::TranslateFilm(const MitsubaObject& sensor) {
     add_number("fov", fov_deg);
     if (sensor.type == "thinlens") {
       add_number("lensradius", view.Float("aperture_radius", 0, kZeroOrMore));
-      add_number("focaldistance", view.Float("focus_distance", 1, kAboveZero));
+      const double far = view.Float("far_clip", 1e4, kAboveZero);
+      add_number("focaldistance", view.Float("focus_distance", far, kAboveZero));
     } else {
       view.Ignore("focus_distance");
     }

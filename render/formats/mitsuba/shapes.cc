@@ -286,7 +286,12 @@ void MitsubaTranslator::TranslateShape(const MitsubaObject& shape) {
     reader_.CarryOut(std::move(interface));
   }
   if (const MitsubaObject* emitter = ChildOf(shape, "emitter")) TranslateAreaEmitter(*emitter);
-  if (list.Bool("flip_normals", false)) reader_.CarryOut(Directive("ReverseOrientation", shape));
+  // Here as in pbrt-v4 a mirroring transform turns round shapes over; in Mitsuba it does not.
+  const bool is_turned =
+      (shape.type == "sphere" || shape.type == "disk" || shape.type == "cylinder") &&
+      ToWorld(shape).SwapsHandedness() && ChildOf(shape, "emitter") == nullptr;
+  if (list.Bool("flip_normals", false) != is_turned)
+    reader_.CarryOut(Directive("ReverseOrientation", shape));
   AddGeometry(shape, list, std::move(made));
   list.WarnOfUnread();
   RefuseOthers(shape, {"bsdf", "medium", "emitter"});

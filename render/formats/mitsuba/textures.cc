@@ -11,7 +11,7 @@ namespace lucerna {
 
 std::optional<std::string> MitsubaTranslator::TextureOf(const MitsubaObject& texture,
                                                         Meaning meaning) {
-  const TextureUse use = {&texture, meaning};
+  const TextureUse use = {&texture, meaning, returned_};
   const auto known = textures_.find(use);
   if (known != textures_.end()) return known->second;
   if (!Open(texture)) return std::nullopt;
@@ -104,7 +104,9 @@ MitsubaTranslator::Placement MitsubaTranslator::TranslateBitmap(const MitsubaObj
   const bool is_black =
       placement.wrap_u == Texture::Wrap::kBlack || placement.wrap_v == Texture::Wrap::kBlack;
   made.parameters.push_back(MakeString("wrap", is_black ? "black" : "repeat", texture.location));
-  for (const std::string_view name : {"filter_type", "max_anisotropy", "cache", "format"})
+  if (list.String("filter_type", "bilinear") == "nearest")
+    made.parameters.push_back(MakeString("filter", "point", texture.location));
+  for (const std::string_view name : {"max_anisotropy", "cache", "format"})
     list.Ignore(name);
   return placement;
 }

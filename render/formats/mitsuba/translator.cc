@@ -334,6 +334,7 @@ UnfinishedScene ReadMitsuba(const std::string& main_path, std::string_view text,
   ReadMitsubaDocument(main_path, text, assets, diagnostics, document);
   // What is left out by an error leads to others that say nothing new.
   if (diagnostics.has_error()) return {};
+  assets.ReadPicturesAsMitsuba();
   return MitsubaTranslator(document, assets, diagnostics).Translate();
 }
 

@@ -10,6 +10,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <tuple>
 #include <vector>
 
 #include "render/formats/asset_reader.h"
@@ -60,7 +61,8 @@ class MitsubaTranslator {
     Rgb reflection = Gray(1), transmission = Gray(1);
   };
   // A texture of one meaning.
-  using TextureUse = std::pair<const MitsubaObject*, Meaning>;
+  // The last is the share of light that a coat sends back to the base that shows the texture.
+  using TextureUse = std::tuple<const MitsubaObject*, Meaning, double>;
 
   // Objects (translator.cc).
   [[nodiscard]] static std::string SubjectOf(const MitsubaObject& object);
@@ -195,6 +197,7 @@ class MitsubaTranslator {
   DirectiveReader reader_{assets_, diagnostics_};
   std::set<std::string> names_;
   std::map<TextureUse, std::optional<std::string>> textures_;
+  double returned_ = 0;  // TextureUse's share, of the textures that are looked for
   std::map<const MitsubaObject*, std::optional<Surface>> surfaces_;
   // Of the material that is made next; pbrt's directives have no words for them.
   std::optional<Tints> tints_;

@@ -335,7 +335,9 @@ bool DirectiveReader::End(Arguments& arguments, std::string_view begun_by) {
 void DirectiveReader::EndAttributes(Arguments& arguments, std::string_view begun_by) {
   const std::vector<GraphicsStack::Scope>& open = graphics_.open_scopes();
   if (!open.empty() && open.back().begun_by != "Import") {
-    End(arguments, begun_by);
+    const std::string_view innermost = open.back().begun_by;
+    const bool ends_either = innermost == "AttributeBegin" || innermost == "TransformBegin";
+    End(arguments, ends_either ? innermost : begun_by);
     return;
   }
   diagnostics_.Warning(arguments.location(), Concat(arguments.directive(), " without ", begun_by,
@@ -352,7 +354,7 @@ bool DirectiveReader::OnAttributeEnd(Arguments& arguments) {
   return true;
 }
 
-// pbrt-v4 reads TransformBegin as AttributeBegin.
+// pbrt-v4 reads TransformBegin as AttributeBegin, and each may end what the other began.
 bool DirectiveReader::OnTransformBegin(Arguments& arguments) {
   Begin(arguments);
   return true;
@@ -379,6 +381,7 @@ bool DirectiveReader::OnAttribute(Arguments& arguments) {
         Concat("Attribute takes shape, light, material, medium or texture, not ", Quoted(target)));
     return true;
   }
+  ReadSpectrumFiles(assets_, parameters, diagnostics_);
   ToRec709(parameters, graphics_.state().rgb_space);
   // The newest first: of two defaults of one name the later counts.
   auto all = std::make_shared<std::vector<Parameter>>(std::move(parameters));

@@ -17,9 +17,9 @@
 namespace lucerna {
 namespace {
 
-// [W·m⁻²] luminance of what falls onto a plane that looks along z of the map. pbrt-v4 weighs each
-// pixel by half its solid angle and so renders a map with an illuminance twice as bright; here it
-// means what it means for a constant light.
+// What pbrt-v4 takes for the illuminance [W·m⁻², luminance] of a plane that looks along z of the
+// map: it weighs each pixel by half its solid angle, so that a map is twice as bright as a constant
+// light of the same "illuminance". Files are made to look right with it.
 double IlluminanceOf(const Picture& map) {
   // A pixel of a small map is large, and the horizon runs through some.
   constexpr int kFineSide = 512;
@@ -35,7 +35,7 @@ double IlluminanceOf(const Picture& map) {
       sum += static_cast<double>(Luminance(map.At(x / parts, y / parts)) * direction.z);
     }
   }
-  return sum * 4 * kPi64 / (static_cast<double>(side) * side);
+  return sum * 2 * kPi64 / (static_cast<double>(side) * side);
 }
 
 // The rectangle that four points in a row are, in the world and not in the light's own space.
@@ -145,11 +145,14 @@ void ReadInfiniteLight(const LightInput& input) {
   }
   GivenSpectrum spectrum;
   const Rgb color = parameters.FindEmission("L", &spectrum).value_or(Gray(1));
-  // A surface that sees constant radiance L over its hemisphere receives pi L. As of a picture,
-  // the illuminance of a light with a portal is that of its radiance, whatever its unit is.
-  if (illuminance > 0) {
+  // A surface that sees constant radiance L over its hemisphere receives pi L. A light with a
+  // portal is a picture of one pixel to pbrt-v4, whose luminance counts, whatever its unit is:
+  // above.
+  if (illuminance > 0 && portal.has_value()) {
+    scale *= illuminance / (2 * kPi64);
+    if (Luminance(color) > 0) scale /= static_cast<double>(Luminance(color));
+  } else if (illuminance > 0) {
     scale *= illuminance / kPi64;
-    if (portal.has_value() && Luminance(color) > 0) scale /= static_cast<double>(Luminance(color));
   } else if (portal.has_value()) {
     scale *= LuminanceInPicture(parameters, spectrum);
   }

@@ -86,8 +86,12 @@ void ReadColor(const MaterialInput& input, Material& material) {
 
 void ReadHair(const MaterialInput& input, Material& material) {
   const auto roughness = [&](std::string_view name) {
-    const double given = NumberOf(name, 0.3, {0, kMostRoughness}, input);
-    return static_cast<float>(std::max(given, kLeastRoughness));
+    const double given = NumberOf(name, 0.3, kZeroOrMore, input);
+    if (given > kMostRoughness) {
+      input.parameters.Warning(
+          name, Concat("is ", given, " and is held at ", kMostRoughness, ", as by pbrt-v4"));
+    }
+    return static_cast<float>(std::clamp(given, kLeastRoughness, kMostRoughness));
   };
   material.beta_m = roughness("beta_m");
   material.beta_n = roughness("beta_n");

@@ -162,8 +162,10 @@ void ReadCoat(std::string_view eta, const MaterialInput& input, Material& materi
     material.thickness = static_cast<float>(parameters.Float("thickness", 0.01, {0, 1e6}));
   }
   const std::int64_t depth = parameters.FindInteger("maxdepth", {1, 1'000'000}).value_or(10);
-  // Every second event is at the base.
-  material.base_hits = static_cast<std::int32_t>(depth / 2 + depth % 2);
+  // Every second event is at the base. Of light that comes back more often nothing is left, but for
+  // coats of an index far above those of this world.
+  constexpr std::int64_t kMostHits = 1000;
+  material.base_hits = static_cast<std::int32_t>(std::min(depth / 2 + depth % 2, kMostHits));
   if (parameters.IsTexture("albedo")) {
     parameters.Error("albedo", "must not be a texture; give a colour or a number");
   } else {

@@ -437,6 +437,7 @@ bool DirectiveReader::OnTexture(Arguments& arguments) {
     return true;
   }
   ReadSpectrumFiles(assets_, parameters, diagnostics_);
+  ToRec709(parameters, graphics_.state().rgb_space);
   ParameterList list(arguments.SubjectOf(name), arguments.location(), std::move(parameters),
                      graphics_.state().DefaultsOf(AttributeTarget::kTexture).get(), diagnostics_);
   WarnIfMoved(arguments, "textures do not move, in pbrt-v4 neither");

@@ -115,6 +115,11 @@ constexpr Kind<FilterReader> kFilters[] = {
 // Of an integrator of pbrt-v4, where 0 is the light of lights alone, and below there is no end.
 int DepthOf(std::int64_t max_depth, ParameterList& parameters) {
   constexpr int kEndless = 1000;
+  constexpr int kMost = 10'000;
+  if (max_depth > kMost) {
+    parameters.Warning("maxdepth", Concat("is ", max_depth, " and is held at ", kMost));
+    return kMost;
+  }
   if (max_depth > 0) return static_cast<int>(max_depth);
   if (max_depth == 0) {
     parameters.Warning("maxdepth", "is 0 and is held at 1: surfaces show the light of lights");
@@ -159,7 +164,7 @@ void ReadFilm(std::string_view type, ParameterList& parameters, FilmSettings& fi
   const std::span<const double> crop = Four(parameters, "cropwindow", kFloatType);
   const std::span<const double> pixels = Four(parameters, "pixelbounds", kBoundsType);
   if (!crop.empty() && !pixels.empty()) {
-    parameters.Error("pixelbounds", "and cropwindow exclude each other; give one of them");
+    parameters.Warning("pixelbounds", "is ignored, as by pbrt-v4, because cropwindow is given");
   }
   std::array<double, 4> bounds = {0, static_cast<double>(film.width), 0,
                                   static_cast<double>(film.height)};
@@ -170,6 +175,9 @@ void ReadFilm(std::string_view type, ParameterList& parameters, FilmSettings& fi
       bounds[i] = std::ceil(static_cast<float>(std::clamp(crop[i], 0.0, 1.0)) *
                             static_cast<float>(side[i]));
     }
+    // Either end of a pair may come first.
+    if (bounds[0] > bounds[1]) std::swap(bounds[0], bounds[1]);
+    if (bounds[2] > bounds[3]) std::swap(bounds[2], bounds[3]);
   } else if (!pixels.empty()) {
     for (std::size_t i = 0; i < 4; ++i) {
       bounds[i] = std::clamp(pixels[i], 0.0, static_cast<double>(i < 2 ? film.width : film.height));
@@ -226,7 +234,7 @@ void ReadIntegrator(std::string_view type, ParameterList& parameters,
                     IntegratorSettings& integrator) {
   integrator.name = std::string(type);
   const std::optional<std::int64_t> depth =
-      parameters.FindInteger("maxdepth", {-2147483648.0, 10'000});
+      parameters.FindInteger("maxdepth", {-2147483648.0, 2147483647.0});
   if (depth.has_value()) integrator.max_depth = DepthOf(*depth, parameters);
   Diagnostics& diagnostics = parameters.diagnostics();
   if (type != "sppm") {

@@ -8,7 +8,7 @@ namespace lucerna {
 
 void ReadDisk(const ShapeInput& input, ShapeSet& shapes) {
   ParameterList& parameters = input.parameters;
-  const ShapePlacement& placement = input.placement;
+  const ShapePlacement placement = PlacementOfQuadric(input.placement);
   const double radius = parameters.Float("radius", 1, kAboveZero);
   const double inner_radius = parameters.Float("innerradius", 0, kZeroOrMore);
   const double height = parameters.Float("height", 0);

@@ -19,7 +19,7 @@ void ReadCylinder(const ShapeInput& input, ShapeSet& shapes) {
   if (IsFlattened(parameters, input.placement.to_world)) return;
   PlaceMesh(
       CylinderMesh(radius, std::min(one_end, other_end), std::max(one_end, other_end), phi_max_rad),
-      parameters, input.placement, shapes);
+      parameters, PlacementOfQuadric(input.placement), shapes);
 }
 
 void ReadBilinearMesh(const ShapeInput& input, ShapeSet& shapes) {

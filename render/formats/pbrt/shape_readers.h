@@ -65,6 +65,8 @@ void ReadUvs(ParameterList& parameters, TriangleMesh& mesh);
 
 // "phimax" in radians, in (0, 2 pi].
 [[nodiscard]] double ReadPhiMax(ParameterList& parameters);
+// As pbrt-v4 has a sphere, disk or cylinder face: turned over by a mirroring transform.
+[[nodiscard]] ShapePlacement PlacementOfQuadric(const ShapePlacement& placement);
 
 // Moves a mesh around the origin to `center`, its axes to `axes`, and winds it by its normals,
 // which are turned over for `is_reversed`.

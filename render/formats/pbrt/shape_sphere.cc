@@ -10,7 +10,7 @@ namespace lucerna {
 
 void ReadSphere(const ShapeInput& input, ShapeSet& shapes) {
   ParameterList& parameters = input.parameters;
-  const ShapePlacement& placement = input.placement;
+  const ShapePlacement placement = PlacementOfQuadric(input.placement);
   const double radius = parameters.Float("radius", 1, kAboveZero);
   const double one_end = std::clamp(parameters.Float("zmin", -radius), -radius, radius);
   const double other_end = std::clamp(parameters.Float("zmax", radius), -radius, radius);

@@ -4,7 +4,9 @@
 // of its world-space edges, turned over by ReverseOrientation and by a mirroring transform, one
 // undoing the other. A mesh with normals faces with its normals, which are mapped as normals and
 // turned over by ReverseOrientation alone. Spheres face outward, flat shapes along +z of their own
-// space; only ReverseOrientation turns them over.
+// space; they are turned over by ReverseOrientation and, where light meets them, by a mirroring
+// transform: pbrt-v4 turns their normals for it and then maps them as normals. The light of those
+// that emit leaves on the side that ReverseOrientation alone decides.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -40,6 +42,11 @@ std::vector<Vec3> Triples(std::span<const double> numbers) {
 void ReadTriangleMesh(const ShapeInput& input, ShapeSet& shapes) {
   ParameterList& parameters = input.parameters;
   TriangleMesh mesh;
+  if (parameters.Has("S")) {
+    parameters.Warning("S",
+                       "is ignored: stretched highlights and normal maps follow the texture "
+                       "coordinates");
+  }
   for (const std::string_view name : {"S", "faceIndices"})
     parameters.Ignore(name);
   const bool has_positions = ReadPositions(parameters, 3, mesh);
@@ -299,8 +306,16 @@ bool IsFlattened(ParameterList& parameters, const Transform& to_world) {
   return true;
 }
 
+ShapePlacement PlacementOfQuadric(const ShapePlacement& placement) {
+  ShapePlacement turned = placement;
+  if (placement.to_world.SwapsHandedness() && !placement.emits)
+    turned.reverse_orientation = !turned.reverse_orientation;
+  return turned;
+}
+
 double ReadPhiMax(ParameterList& parameters) {
-  return parameters.Float("phimax", 360, {0, 360, false}) * std::numbers::pi / 180;
+  // pbrt-v4 holds it at a whole turn.
+  return std::min(parameters.Float("phimax", 360, kAboveZero), 360.0) * std::numbers::pi / 180;
 }
 
 void PutOnAxes(Vec3 center, const ShapeAxes& axes, bool is_reversed, TriangleMesh& mesh) {

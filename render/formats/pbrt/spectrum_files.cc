@@ -50,7 +50,8 @@ void ReadSpectrumFiles(AssetReader& assets, std::vector<Parameter>& parameters,
   for (Parameter& parameter : parameters) {
     if (parameter.type != "spectrum" || parameter.strings.size() != 1) continue;
     const std::string& file = parameter.strings[0];
-    if (!file.ends_with(".spd")) continue;
+    // Names of curves have no dots.
+    if (file.find('.') == std::string::npos) continue;
     StatusOr<std::vector<double>> numbers = [&]() -> StatusOr<std::vector<double>> {
       LUCERNA_ASSIGN_OR_RETURN(const std::string text, assets.ReadBytes(file));
       return ParseNumbers(text);
