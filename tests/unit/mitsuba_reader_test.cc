@@ -354,6 +354,12 @@ TEST(MitsubaReaderTest, AMirrorDoesNotTurnRoundShapesOver) {
     EXPECT_FALSE(scene.spheres.at(0).inward);
     EXPECT_GT(scene.disks.at(0).normal.z, 0);
   }
+  // Those that show a texture are meshes.
+  const Scene textured = SceneOf("<shape type='disk'>" + mirror +
+                                 "<bsdf type='diffuse'><texture type='checkerboard' "
+                                 "name='reflectance'/></bsdf></shape>");
+  for (const Vec3 normal : textured.meshes.at(0).normals)
+    EXPECT_GT(normal.z, 0);
 }
 
 TEST(MitsubaReaderTest, BlendsMasksAndBumpsAreMixesAlphaAndDisplacement) {

@@ -224,7 +224,8 @@ TEST(PortalLightTest, IsReadAsPbrtHasIt) {
   // Illuminance and scale are those of the whole sky.
   const ParsedScene lux = Parse(kEven + "\"float illuminance\" 5");
   ASSERT_TRUE(lux.ok());
-  EXPECT_NEAR(static_cast<double>(lux.scene.infinite_lights.at(0).radiance.g), 5 / kPi64, 1e-5);
+  EXPECT_NEAR(static_cast<double>(lux.scene.infinite_lights.at(0).radiance.g), 5 / (2 * kPi64),
+              1e-5);
 }
 
 TEST(PortalLightTest, IsAlsoScaledWithAScene) {

@@ -185,7 +185,7 @@ double InnerReflectance(double index, double alpha) {
   constexpr int kSlopes = 32;
   constexpr int kAzimuths = 32;
   constexpr int kCosines = 128;
-  const double a2 = std::max(alpha * alpha, 1e-12);
+  const double a2 = std::clamp(alpha * alpha, 1e-12, 1e6);
   const auto visible = [&](double cosine) {
     const double c2 = cosine * cosine;
     return 2 / (1 + std::sqrt(1 + a2 * (1 - c2) / c2));
@@ -244,7 +244,7 @@ bool MitsubaTranslator::AddPlastic(const MitsubaObject& bsdf, ParameterList& lis
   if (!is_nonlinear && reflectance->type == "rgb") {
     for (double& rho : reflectance->numbers)
       rho = rho / (1 - inside + rho * inside);
-  } else if (!is_nonlinear && !is_picture) {
+  } else if (inside > 0 && !is_picture) {
     list.Warning("diffuse_reflectance",
                  "is neither a colour nor a bitmap and is rendered as with nonlinear: its colours "
                  "are darker and more saturated");

@@ -225,6 +225,10 @@ void MitsubaTranslator::AddGeometry(const MitsubaObject& shape, ParameterList& l
     return;
   }
   SetTransform(to_world, shape);
+  // Here as in pbrt-v4 a mirroring transform turns round shapes over that do not emit; in Mitsuba
+  // it does not.
+  if (to_world.SwapsHandedness() && emitter == nullptr)
+    reader_.CarryOut(Directive("ReverseOrientation", shape));
   reader_.CarryOut(std::move(made));
 }
 
@@ -286,12 +290,7 @@ void MitsubaTranslator::TranslateShape(const MitsubaObject& shape) {
     reader_.CarryOut(std::move(interface));
   }
   if (const MitsubaObject* emitter = ChildOf(shape, "emitter")) TranslateAreaEmitter(*emitter);
-  // Here as in pbrt-v4 a mirroring transform turns round shapes over; in Mitsuba it does not.
-  const bool is_turned =
-      (shape.type == "sphere" || shape.type == "disk" || shape.type == "cylinder") &&
-      ToWorld(shape).SwapsHandedness() && ChildOf(shape, "emitter") == nullptr;
-  if (list.Bool("flip_normals", false) != is_turned)
-    reader_.CarryOut(Directive("ReverseOrientation", shape));
+  if (list.Bool("flip_normals", false)) reader_.CarryOut(Directive("ReverseOrientation", shape));
   AddGeometry(shape, list, std::move(made));
   list.WarnOfUnread();
   RefuseOthers(shape, {"bsdf", "medium", "emitter"});
