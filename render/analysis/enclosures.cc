@@ -28,26 +28,18 @@ bool LieOnOneSide(const Triangle& triangle, std::span<const Vec3> points, double
   return lowest > limit || highest < -limit;
 }
 
+Triangle TriangleAt(const WeldedTriangles& walls, std::uint32_t number) {
+  const std::uint32_t* const corner = &walls.corners[std::size_t{3} * number];
+  return {walls.positions[corner[0]], walls.positions[corner[1]], walls.positions[corner[2]]};
+}
+
 // Triangles of all meshes that count, each once.
-struct Walls {
-  std::vector<Vec3> positions;
-  std::vector<std::uint32_t> corners;  // [triangles × 3]
-
-  [[nodiscard]] std::size_t size() const { return corners.size() / 3; }
-  [[nodiscard]] Triangle At(std::uint32_t triangle) const {
-    return {positions[corners[3 * triangle]], positions[corners[3 * triangle + 1]],
-            positions[corners[3 * triangle + 2]]};
-  }
-};
-
-Walls WallsOf(const Scene& scene, const MaterialPredicate& is_wall) {
-  WeldedTriangles all = WeldMeshes(scene.meshes, [&](const TriangleMesh& mesh) {
+WeldedTriangles WallsOf(const Scene& scene, const MaterialPredicate& is_wall) {
+  WeldedTriangles walls = WeldMeshes(scene.meshes, [&](const TriangleMesh& mesh) {
     return IsWhole(mesh.traits) && mesh.traits.motion == kNoMotion &&
            is_wall(scene.materials[static_cast<std::size_t>(mesh.traits.material)]);
   });
-  const std::vector<std::uint32_t>& corners = all.corners;
-  Walls walls;
-  walls.positions = std::move(all.positions);
+  const std::vector<std::uint32_t> corners = std::exchange(walls.corners, {});
   // The same triangle twice is one wall.
   std::vector<std::pair<std::array<std::uint32_t, 3>, std::uint32_t>> sorted;
   sorted.reserve(corners.size() / 3);
@@ -69,7 +61,7 @@ Walls WallsOf(const Scene& scene, const MaterialPredicate& is_wall) {
 
 // Side 2t is the front of triangle t, 2t + 1 its back. Sides that face each other around an edge,
 // with no triangle between them, look into the same region.
-UnionFind RegionsOf(const Walls& walls, const std::vector<TriangleSide>& sides) {
+UnionFind RegionsOf(const WeldedTriangles& walls, const std::vector<TriangleSide>& sides) {
   UnionFind regions(2 * walls.size());
   struct Around {
     double angle;
@@ -171,7 +163,7 @@ bool ClosedSurface::IsApartFrom(std::span<const Vec3> points) const {
 
 std::vector<ClosedSurface> ClosedSurfacesOf(const Scene& scene, const MaterialPredicate& is_wall) {
   std::vector<ClosedSurface> surfaces;
-  const Walls walls = WallsOf(scene, is_wall);
+  const WeldedTriangles walls = WallsOf(scene, is_wall);
   const std::vector<TriangleSide> sides = SidesByEdge(walls.corners, walls.positions.size());
   UnionFind regions = RegionsOf(walls, sides);
   // A region is bounded by the triangles that have one side in it; those that have both are
@@ -200,7 +192,7 @@ std::vector<ClosedSurface> ClosedSurfacesOf(const Scene& scene, const MaterialPr
     std::vector<Triangle> placed;
     placed.reserve(triangles.size());
     for (const std::uint32_t t : triangles)
-      placed.push_back(walls.At(t));
+      placed.push_back(TriangleAt(walls, t));
     surfaces.emplace_back(std::move(placed));
   }
   ForEachAnalyticShape(scene, [&](const auto& shape) {

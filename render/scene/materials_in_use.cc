@@ -1,6 +1,7 @@
 #include "render/scene/materials_in_use.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <set>
 #include <string>
@@ -22,11 +23,15 @@ double SecondsOfCoat(const Material& material) {
       material.alpha_u != material.alpha_v || material.base_alpha_u != material.base_alpha_v;
   double facets = 0.006 * (is_stretched ? 9 : 1);
   if (has_metal) {
-    // Of light on its way up less the more leaves the denser the coat is: so often it meets the
-    // metal, and each time of all walks takes so long.
-    constexpr double kSecondsOfMeeting = 0.006;
+    // The denser a coat is and the narrower its facets and the metal's are, the less of the light
+    // on its way up leaves, and the more often that meets the metal. Measured for indices from 1.5
+    // to 100 and widths from 0.002 to 0.3.
+    constexpr double kSecondsOfMeeting = 0.018;  // of all walks of a table
+    const auto width = static_cast<double>(std::max(
+        {material.alpha_u, material.alpha_v, material.base_alpha_u, material.base_alpha_v}));
     const double meetings = std::min<double>(
-        material.base_hits, 2.5 * static_cast<double>(material.ior * material.ior));
+        material.base_hits,
+        1.3 * static_cast<double>(material.ior * material.ior) / std::sqrt(std::max(width, 1e-6)));
     facets = (0.12 + kSecondsOfMeeting * std::max(0.0, meetings - 5)) * (is_stretched ? 3 : 1);
   } else if (material.alpha_u == 0 && material.alpha_v == 0 && !material.HasCoatTexture()) {
     facets = 5e-4;  // one sum

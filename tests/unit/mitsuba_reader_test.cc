@@ -825,27 +825,28 @@ TEST(MitsubaReaderTest, ClippingAndShiftsThatChangeAViewAreWarnedOf) {
   }
 }
 
+// A sensor with these parameters before a sphere.
+ParsedScene ReadSensor(const std::string& type, const std::string& parameters) {
+  return ReadXml("<scene version='3.0.0'><sensor type='" + type +
+                 "'><float name='fov' value='40'/>" + parameters +
+                 "</sensor><emitter type='constant'/><shape type='sphere'/></scene>");
+}
+
 TEST(MitsubaReaderTest, AThinLensWithoutADistanceFocusesFarAway) {
-  const auto scene_of = [](const std::string& more) {
-    return ReadXml(
-        "<scene version='3.0.0'><sensor type='thinlens'><float name='aperture_radius' "
-        "value='0.1'/><float name='fov' value='40'/>" +
-        more + "</sensor><emitter type='constant'/><shape type='sphere'/></scene>");
+  const auto focal_distance = [](const std::string& more) {
+    return ReadSensor("thinlens", Float("aperture_radius", 0.1) + more).scene.camera.focal_distance;
   };
-  EXPECT_EQ(scene_of("").scene.camera.focal_distance, 1e4F);
-  EXPECT_EQ(scene_of("<float name='focus_distance' value='3'/>").scene.camera.focal_distance, 3);
+  EXPECT_EQ(focal_distance(""), 1e4);
+  EXPECT_EQ(focal_distance(Float("focus_distance", 3)), 3);
 }
 
 TEST(MitsubaReaderTest, AxesOfAnglesAreKnownInAnyCaseOrRefused) {
-  const auto scene_of = [](const std::string& axis) {
-    return ReadXml(
-        "<scene version='3.0.0'><sensor type='perspective'><float name='fov' "
-        "value='40'/><string name='fov_axis' value='" +
-        axis + "'/></sensor><emitter type='constant'/><shape type='sphere'/></scene>");
+  const auto read = [](const std::string& axis) {
+    return ReadSensor("perspective", "<string name='fov_axis' value='" + axis + "'/>");
   };
-  EXPECT_EQ(scene_of("Y").scene.camera.fov_deg, scene_of("y").scene.camera.fov_deg);
-  EXPECT_NE(scene_of("y").scene.camera.fov_deg, scene_of("x").scene.camera.fov_deg);
-  EXPECT_THAT(Said(scene_of("z")), HasSubstr("must be x, y, diagonal, smaller or larger"));
+  EXPECT_EQ(read("Y").scene.camera.fov_deg, read("y").scene.camera.fov_deg);
+  EXPECT_NE(read("y").scene.camera.fov_deg, read("x").scene.camera.fov_deg);
+  EXPECT_THAT(Said(read("z")), HasSubstr("must be x, y, diagonal, smaller or larger"));
 }
 
 TEST(MitsubaReaderTest, AFocalLengthMayHaveAFraction) {
