@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "render/base/parallel.h"
+#include "render/base/shared_values.h"
 #include "render/math/rng.h"
 #include "render/math/warp.h"
 #include "render/scene/coat_table.h"
@@ -682,21 +683,27 @@ std::shared_ptr<const CoatFamily> FamilyOf(const Material& material,
 }  // namespace
 
 void PrepareCoats(std::vector<Material>& materials, int threads) {
+  using FamilyKey = std::pair<CoatNumbers, CoatFamily::Differing>;
+  static SharedValues<CoatNumbers, CoatTable> shared_tables;
+  static SharedValues<FamilyKey, CoatFamily> shared_families;
   std::map<CoatNumbers, std::shared_ptr<const CoatTable>> tables;
-  std::map<std::pair<CoatNumbers, CoatFamily::Differing>, std::shared_ptr<const CoatFamily>>
-      families;
+  std::map<FamilyKey, std::shared_ptr<const CoatFamily>> families;
   std::vector<WantedCoat> wanted;
   for (Material& material : materials) {
     if (!HasCoatTables(material)) continue;
     if (material.HasCoatTexture()) {
-      auto& family = families[{CoatNumbersOf(material), DifferingOf(material)}];
+      const FamilyKey key(CoatNumbersOf(material), DifferingOf(material));
+      auto& family = families[key];
+      if (family == nullptr) family = shared_families.Find(key);
       if (family == nullptr) family = FamilyOf(material, wanted);
       material.owned_coats = family;
       material.coats = family.get();
       FitCoat(material);
       continue;
     }
-    auto& table = tables[CoatNumbersOf(material)];
+    const CoatNumbers key = CoatNumbersOf(material);
+    auto& table = tables[key];
+    if (table == nullptr) table = shared_tables.Find(key);
     if (table == nullptr) {
       const auto made = std::make_shared<CoatTable>();
       wanted.push_back({material, made.get()});
@@ -710,6 +717,10 @@ void PrepareCoats(std::vector<Material>& materials, int threads) {
     for (std::size_t i = begin; i < end; ++i)
       *wanted[i].table = MakeCoat(wanted[i].material);
   });
+  for (const auto& [key, table] : tables)
+    shared_tables.Share(key, table);
+  for (const auto& [key, family] : families)
+    shared_families.Share(key, family);
 }
 
 }  // namespace lucerna

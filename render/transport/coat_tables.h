@@ -8,9 +8,10 @@
 
 namespace lucerna {
 
-// Gives coated materials their tables. Materials with equal coats share one. With a texture of
-// roughness, tables of several widths, between which FitCoat interpolates. Tables take up to 0.2 s
-// of processor time each; threads as in ThreadTeam, with the same tables for any number.
+// Gives coated materials their tables. Materials with equal coats share one, also with those of
+// other scenes in memory. With a texture of roughness, tables of several widths, between which
+// FitCoat interpolates. Tables take up to 0.2 s of processor time each; threads as in ThreadTeam,
+// with the same tables for any number.
 void PrepareCoats(std::vector<Material>& materials, int threads = 1);
 
 }  // namespace lucerna

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "render/base/parallel.h"
+#include "render/base/shared_values.h"
 #include "render/math/warp.h"
 #include "render/transport/bsdf.h"
 #include "render/transport/material_at.h"
@@ -195,23 +196,29 @@ SubsurfaceTable MakeSubsurfaceTable(float ior, float g) {
 void PrepareSubsurface(std::vector<Material>& materials, int threads) {
   using Key = std::pair<float, float>;
   const auto key_of = [](const Material& material) { return Key(material.ior, material.phase_g); };
-  std::map<Key, std::shared_ptr<SubsurfaceTable>> tables;
+  static SharedValues<Key, SubsurfaceTable> shared;
+  std::map<Key, std::shared_ptr<const SubsurfaceTable>> tables;
   std::vector<std::pair<Key, SubsurfaceTable*>> wanted;
   for (const Material& material : materials) {
     if (material.kind != Material::Kind::kSubsurface) continue;
-    auto& table = tables[key_of(material)];
+    const Key key = key_of(material);
+    auto& table = tables[key];
+    if (table == nullptr) table = shared.Find(key);
     if (table != nullptr) continue;
-    table = std::make_shared<SubsurfaceTable>();
-    wanted.emplace_back(key_of(material), table.get());
+    const auto made = std::make_shared<SubsurfaceTable>();
+    wanted.emplace_back(key, made.get());
+    table = made;
   }
-  if (wanted.empty()) return;
+  if (tables.empty()) return;
   ThreadTeam(threads).For(wanted.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i)
       *wanted[i].second = MakeSubsurfaceTable(wanted[i].first.first, wanted[i].first.second);
   });
+  for (const auto& [key, table] : tables)
+    shared.Share(key, table);
   for (Material& material : materials) {
     if (material.kind != Material::Kind::kSubsurface) continue;
-    const std::shared_ptr<SubsurfaceTable>& table = tables[key_of(material)];
+    const std::shared_ptr<const SubsurfaceTable>& table = tables[key_of(material)];
     material.owned_below = table;
     material.below = table.get();
     if (material.scatters_for_reflectance) continue;

@@ -46,7 +46,7 @@ Finished Lucerna(const std::vector<std::string>& variables, const std::vector<st
 std::string LiveViewIn(const std::string& variable, const TemporaryFolder& folder) {
   const OnTerminal ran = RunOnTerminal(
       InLocale({variable, "TERM=xterm-256color", "COLORTERM=truecolor"},
-               {"render", SceneOfTests("caustic.pbrt"), "--size", "96x72", "--time", "3s",
+               {"render", SceneOfTests("caustic.pbrt"), "--size", "96x72", "--passes", "40",
                 "--error", "0.01%", "-o", folder.At("image.exr"), "--no-checkpoints", "--force"}));
   EXPECT_EQ(ran.exit_code, 0) << ran.bytes;
   return ran.bytes;

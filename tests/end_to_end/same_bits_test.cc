@@ -130,8 +130,8 @@ void PrintTo(const Case& c, std::ostream* out) {
 class SameBitsTest : public testing::TestWithParam<Case> {};
 
 TEST_P(SameBitsTest, ForAnyWorkersThreadsAndBatches) {
-  ExpectEqual({GetParam().scene, GetParam().controller, 4, 60'000, "96x72"},
-              {{1, 2, 0}, {3, 1, 0}, {1, 1, 1000}, {3, 1, 7777}, {2, 2, 60000}});
+  ExpectEqual({GetParam().scene, GetParam().controller, 4, 30'000, "96x72"},
+              {{1, 2, 0}, {3, 1, 0}, {1, 1, 1000}, {3, 1, 7777}, {2, 2, 30000}});
 }
 
 class SameBitsOfRoundsTest : public testing::TestWithParam<Case> {};
@@ -139,7 +139,7 @@ class SameBitsOfRoundsTest : public testing::TestWithParam<Case> {};
 // Passes 16 to 31 are in rounds of two and those from 32 on in rounds of four, of which the last is
 // not whole. With five workers the passes up to 32 are split by photons.
 TEST_P(SameBitsOfRoundsTest, ForAnyWorkersThreadsBatchesAndKills) {
-  ExpectEqual({GetParam().scene, GetParam().controller, 47, 9000, "48x36"}, {{1, 2, 0},
+  ExpectEqual({GetParam().scene, GetParam().controller, 38, 6000, "48x36"}, {{1, 2, 0},
                                                                              {2, 1, 0},
                                                                              {5, 1, 0},
                                                                              {7, 2, 777},

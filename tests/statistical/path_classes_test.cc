@@ -134,12 +134,12 @@ TEST_P(PathClassTest, IsSampled) {
   }
 }
 
-// The file is what the path tracer sees of these scenes: of one class in twelve it is traced again,
+// The file is what the path tracer sees of these scenes: of one class in 47 it is traced again,
 // with other random numbers.
 TEST(PathTracerTest, SeesWhatIsWrittenDown) {
   const std::vector<PathClass> cells = AllPathClasses();
   EXPECT_EQ(Traced().size(), cells.size());
-  constexpr std::size_t kOneIn = 12;
+  constexpr std::size_t kOneIn = 47;
   constexpr int kReplicas = 24;
   const double quantile =
       StudentQuantile(SidakLevel(1e-3, static_cast<int>(cells.size() / kOneIn + 1) * 5), kReplicas);

@@ -4,6 +4,7 @@
 
 #include "render/base/status.h"
 #include "render/image/image.h"
+#include "render/transport/working_space.h"
 #include "tests/support/local_render.h"
 
 namespace lucerna {
@@ -46,6 +47,8 @@ std::vector<PathComparison> EstimateBlocks(const Scene& scene, RenderSettings se
     blocks.push_back({{x, y, x + width / side, y + height / side}, {}, {}});
   }
 
+  // Tables of its materials are in memory as long as this is: all parts share them.
+  const Scene with_tables = InWorkingSpace(scene, threads);
   std::vector<std::vector<double>> means(blocks.size());
   const std::uint64_t first_seed = settings.seed;
   for (int part = 0; part < parts; ++part) {

@@ -303,33 +303,52 @@ TEST(CoatTest, EqualCoatsShareATable) {
 }
 
 TEST(CoatTest, ManyThreadsMakeTheSameTables) {
-  const auto prepared = [](int threads) {
+  // Copies: tables that are still in memory would not be made again.
+  const auto made = [](int threads) {
     std::vector<Material> materials = {CoatedMaterial(0.2F, 0.3F), CoatedMaterial(0.7F, 0),
                                        WithHaze(CoatedMaterial(0.5F, 0.1F), 0.9F, 0.2F),
                                        CoatedMetal(Gray(0.2F), Gray(3), 0.1F, 0.3F, 0.1F)};
     Material textured = CoatedMaterial(0.5F, 0.4F);
     textured.roughness_textures[0] = textured.roughness_textures[1] = 0;
     materials.push_back(textured);
+    for (Material& material : materials)
+      material.owned_coat.reset();
     PrepareCoats(materials, threads);
+    std::vector<CoatTable> tables = materials.back().coats->tables;
+    EXPECT_GT(tables.size(), 1U);
+    for (std::size_t i = 0; i + 1 < materials.size(); ++i)
+      tables.push_back(*materials[i].coat);
+    return tables;
+  };
+  const std::vector<CoatTable> one = made(1);
+  const std::vector<CoatTable> four = made(4);
+  ASSERT_EQ(one.size(), four.size());
+  for (std::size_t i = 0; i < one.size(); ++i) {
+    EXPECT_GT(one[i].inner, 0);
+    EXPECT_EQ(one[i].entering, four[i].entering);
+    EXPECT_EQ(one[i].inner, four[i].inner);
+    EXPECT_EQ(one[i].leaving, four[i].leaving);
+    EXPECT_EQ(one[i].residual, four[i].residual);
+    EXPECT_EQ(one[i].scattering.entering, four[i].scattering.entering);
+    EXPECT_EQ(one[i].scattering.inner, four[i].scattering.inner);
+  }
+}
+
+TEST(CoatTest, EqualCoatsOfTwoScenesShareATable) {
+  const auto of_a_scene = [](float roughness) {
+    std::vector<Material> materials = {CoatedMaterial(0.2F, roughness)};
+    materials.push_back(materials.front());
+    materials.back().roughness_textures[0] = materials.back().roughness_textures[1] = 0;
+    PrepareCoats(materials);
     return materials;
   };
-  const std::vector<Material> one = prepared(1);
-  const std::vector<Material> four = prepared(4);
-  const auto same = [](const CoatTable& a, const CoatTable& b) {
-    EXPECT_EQ(a.entering, b.entering);
-    EXPECT_EQ(a.inner, b.inner);
-    EXPECT_EQ(a.leaving, b.leaving);
-    EXPECT_EQ(a.residual, b.residual);
-    EXPECT_EQ(a.scattering.entering, b.scattering.entering);
-    EXPECT_EQ(a.scattering.inner, b.scattering.inner);
-  };
-  for (std::size_t i = 0; i + 1 < one.size(); ++i) {
-    EXPECT_GT(one[i].coat->inner, 0);
-    same(*one[i].coat, *four[i].coat);
-  }
-  ASSERT_GT(one.back().coats->tables.size(), 1U);
-  for (std::size_t i = 0; i < one.back().coats->tables.size(); ++i)
-    same(one.back().coats->tables[i], four.back().coats->tables[i]);
+  const std::vector<Material> here = of_a_scene(0.3F);
+  const std::vector<Material> there = of_a_scene(0.3F);
+  const std::vector<Material> other = of_a_scene(0.4F);
+  EXPECT_EQ(here[0].coat, there[0].coat);
+  EXPECT_EQ(here[1].coats, there[1].coats);
+  EXPECT_NE(here[0].coat, other[0].coat);
+  EXPECT_NE(here[1].coats, other[1].coats);
 }
 
 // Two mirrors: the closed sum of all orders in one direction.
