@@ -329,7 +329,10 @@ std::pair<std::vector<JobReport>, std::uint64_t> Coordinator::List(const JobFilt
 
 StatusOr<JobReport> Coordinator::Cancel(const std::string& job_id) {
   StatusOr<JobReport> report = WithWorkers(jobs_.Cancel(job_id, Now()));
-  if (report.ok()) spdlog::info("job {}: a cancel came", job_id);
+  if (!report.ok()) return report;
+  spdlog::info("job {}: a cancel came", job_id);
+  // What it kept is room for others. One whose turn it is has its files until the turn has ended.
+  RemoveUnneeded();
   return report;
 }
 

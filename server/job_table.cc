@@ -846,7 +846,11 @@ void JobTable::AddEvent(const std::string& job_id, std::string what, const Momen
 void JobTable::OnCheckpoint(const std::string& job_id) {
   const MutexLock lock(mutex_);
   const auto found = FindLocked(job_id);
-  if (found != entries_.end()) found->second.has_checkpoint = true;
+  if (found == entries_.end()) return;
+  // One that was cancelled while this was written needs it no more.
+  const JobState state = found->second.job.life.state();
+  if (state != JobState::kCancelled && state != JobState::kFailed)
+    found->second.has_checkpoint = true;
 }
 
 void JobTable::OnRunning(const std::string& job_id, const Moment& moment) {

@@ -1,6 +1,17 @@
 #include "render/wire/tally_codec.h"
 
+#include <string>
+
+#include "absl/strings/str_cat.h"
+
 namespace lucerna {
+namespace {
+
+// Far above what honest workers count. Without it one forged counter could make the sums with the
+// results of others overflow, which are then refused in its place.
+constexpr std::uint64_t kMostCounted = std::uint64_t{1} << 57;
+
+}  // namespace
 
 void WriteTally(ByteWriter& writer, const BatchTally& tally) {
   writer.Varint(kBatchCounters.size());
@@ -22,8 +33,13 @@ StatusOr<BatchTally> ReadTally(ByteReader& reader) {
   if (reader.Varint() != kBatchCounters.size()) {
     return absl::InvalidArgumentError("it has other counters");
   }
-  for (const auto& counter : kBatchCounters)
+  for (const auto& counter : kBatchCounters) {
     tally.*counter.value = reader.Varint();
+    if (tally.*counter.value > kMostCounted) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("it counts too many ", std::string(counter.name)));
+    }
+  }
   if (reader.Varint() != kEnergyCounters.size()) {
     return absl::InvalidArgumentError("it has other counters");
   }

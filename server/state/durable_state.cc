@@ -71,7 +71,9 @@ Status DurableState::Load(const Moment& moment) {
     entry.request_id = row.request_id;
     entry.job = std::move(record->job);
     entry.image_digest = record->image;
-    entry.has_checkpoint = checkpoints_->Has(entry.job.id);
+    const JobState life = entry.job.life.state();
+    entry.has_checkpoint = life != JobState::kCancelled && life != JobState::kFailed &&
+                           checkpoints_->Has(entry.job.id);
     jobs_.push_back(std::move(entry));
   }
   LUCERNA_ASSIGN_OR_RETURN(const std::vector<StoredWorker> workers, store_->LoadWorkers());

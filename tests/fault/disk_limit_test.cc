@@ -11,6 +11,7 @@
 #include "gtest/gtest.h"
 
 #include "tests/fault/coordinator_process.h"
+#include "tests/support/process.h"
 #include "tests/support/temporary_folder.h"
 
 namespace lucerna {
@@ -115,6 +116,38 @@ TEST(DiskLimitTest, ACheckpointThatDoesNotFitPausesTheJob) {
   EXPECT_EQ(coordinator->Wait(id).state(), v1::JOB_STATE_SUCCEEDED);
   EXPECT_EQ(coordinator->ImageDigest(id).Hex(),
             UnfaultedDigest(job.scene, job.passes, job.photons).Hex());
+}
+
+// Until there is one, or none. Whether it came to that.
+bool WaitForCheckpoints(const TemporaryFolder& folder, bool there) {
+  for (int i = 0; i < 3000; ++i) {
+    std::error_code error;
+    if (std::filesystem::is_empty(folder.At("checkpoints"), error) != there && !error) return true;
+    std::this_thread::sleep_for(milliseconds(10));
+  }
+  return false;
+}
+
+TEST(DiskLimitTest, WhatAPausedJobKeptIsGoneOnceItIsCancelled) {
+  const TemporaryFolder folder;
+  const std::string address = FreeAddress();
+  auto coordinator = std::make_unique<CoordinatorProcess>(KeptIn(folder.path(), 0), address);
+  auto worker = coordinator->StartWorker();
+  const std::string id = coordinator->TrySubmit({.passes = 5000, .photons = 20'000}).value();
+  ASSERT_TRUE(WaitForCheckpoints(folder, true));
+  const auto ask = [&](const std::string& word) {
+    const Finished asked = RunProgram({kBin + "/lucerna", word, id, "--server", address});
+    EXPECT_EQ(asked.exit_code, 0) << asked.errors;
+  };
+  ask("pause");
+  // A coordinator that is started again has given it no turn.
+  coordinator->process().Signal(SIGTERM);
+  ASSERT_EQ(coordinator->process().WaitForExit(kPatience), 0);
+  coordinator = std::make_unique<CoordinatorProcess>(KeptIn(folder.path(), 0), address);
+  ASSERT_EQ(coordinator->Get(id).state(), v1::JOB_STATE_PAUSED);
+  ASSERT_TRUE(WaitForCheckpoints(folder, true));
+  ask("cancel");
+  EXPECT_TRUE(WaitForCheckpoints(folder, false));
 }
 
 }  // namespace

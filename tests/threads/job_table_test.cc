@@ -444,6 +444,8 @@ TEST(JobTableTest, ForgetsAJobOnRequestWhenItHasEndedAndSaysWhichFilesAreNeeded)
   EXPECT_EQ(table.Needed().checkpoints, std::set<std::string>{job});
   EXPECT_TRUE(table.Cancel(job, MomentAt(1)).ok());
   EXPECT_TRUE(table.Needed().checkpoints.empty());
+  table.OnCheckpoint(job);
+  EXPECT_TRUE(table.Needed().checkpoints.empty()) << "written while the cancel came";
   journal.is_full = true;
   EXPECT_TRUE(absl::IsResourceExhausted(table.Delete(job, MomentAt(1))));
   EXPECT_TRUE(table.Find(job));

@@ -40,7 +40,7 @@ SliceSums RandomSlice(const SliceShape& shape) {
   }
   slice.eye_rays = 12'345;
   slice.tally = {.photons = kPhotons * shape.passes.size(),
-                 .rays = std::uint64_t{1} << 60,
+                 .rays = std::uint64_t{1} << 57,
                  .deposits = 2000,
                  .pairs = 5000,
                  .dropped = 2,

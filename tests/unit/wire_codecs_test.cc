@@ -240,6 +240,22 @@ TEST(AccumulationCodecTest, RefusesPhotonsByLightThatCannotBe) {
   EXPECT_FALSE(decodes({{.sent = 40, .in_view = {41, 0}}}));
 }
 
+TEST(AccumulationCodecTest, RefusesCountersThatNoWorkerReaches) {
+  const auto decodes = [](std::uint64_t BatchTally::*counter, std::uint64_t value) {
+    Accumulation accumulation;
+    accumulation.tally.photons = 100;
+    accumulation.tally.*counter = value;
+    return DecodeAccumulation(EncodeAccumulation(accumulation, 10), 10).ok();
+  };
+  constexpr std::uint64_t kMost = std::uint64_t{1} << 57;
+  for (const auto counter :
+       {&BatchTally::rays, &BatchTally::deposits, &BatchTally::pairs, &BatchTally::excess}) {
+    EXPECT_TRUE(decodes(counter, kMost));
+    EXPECT_FALSE(decodes(counter, kMost + 1));
+    EXPECT_FALSE(decodes(counter, std::numeric_limits<std::uint64_t>::max()));
+  }
+}
+
 TEST(AccumulationCodecTest, BringsSparseAndEmptyOnesBack) {
   for (const double share : {0.0, 0.001, 0.05, 1.0}) {
     const Accumulation accumulation = RealisticAccumulation(kPixels, share);
